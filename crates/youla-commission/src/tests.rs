@@ -357,7 +357,9 @@ fn a_machine_over_its_link_is_commissioned() {
     let (end, file) = (over.clone(), place.0.join("weak.toml"));
     let machine = std::thread::spawn(move || {
         let plant = TwinPlant::Bearing { fidelity: Fidelity::Rotating { rpm: 0.0 }, cross_coupling: 0.0 };
-        serve_loop(&socket, &file, &plant, (1, true), || end.load(std::sync::atomic::Ordering::Relaxed))
+        serve_loop(youla_rig::Port { socket: &socket, key: None }, &file, &plant, (1, true), || {
+            end.load(std::sync::atomic::Ordering::Relaxed)
+        })
     });
     let campaign = Campaign { machine: Some(address.clone()), ..short() };
     let refused = place.run(&campaign, "refused", false).0.unwrap();

@@ -13,7 +13,13 @@ pub const LARGEST_FRAME: usize = 1400;
 /// Bytes of the longest body.
 pub const LARGEST_BODY: usize = LARGEST_FRAME - HEADER - CHECKSUM;
 
+/// Bytes of the longest frame with the tag of a [`crate::Key`].
+pub const LARGEST_SIGNED: usize = SIGNED.len() + LARGEST_FRAME + TAG;
+
 const MAGIC: [u8; 2] = *b"YL";
+/// Before a frame whose authentication tag is behind it.
+pub(crate) const SIGNED: [u8; 2] = *b"YK";
+pub(crate) const TAG: usize = 32;
 const HEADER: usize = 20;
 const CHECKSUM: usize = 4;
 const SHORTEST: usize = HEADER + CHECKSUM;
@@ -63,6 +69,10 @@ pub enum FrameError {
     Kind(u8),
     /// Not a whole COBS packet.
     Packet,
+    /// Without an authentication tag, where a key is set.
+    Unsigned,
+    /// With the authentication tag of another key.
+    Key,
 }
 
 impl fmt::Display for FrameError {
@@ -79,11 +89,18 @@ impl fmt::Display for FrameError {
             }
             FrameError::Kind(kind) => write!(f, "frames of kind {kind} are not known"),
             FrameError::Packet => f.write_str("the bytes between two zeros are not a COBS packet"),
+            FrameError::Unsigned => f.write_str("the frame has no authentication tag, and a key is set"),
+            FrameError::Key => f.write_str("the authentication tag of the frame is not that of the key"),
         }
     }
 }
 
 impl core::error::Error for FrameError {}
+
+/// Frame and tag of signed bytes.
+pub(crate) fn parts(bytes: &[u8]) -> Option<(&[u8], &[u8; TAG])> {
+    bytes.strip_prefix(&SIGNED)?.split_last_chunk()
+}
 
 impl<'a> Frame<'a> {
     /// Into the front of a buffer; returns the number of bytes.
@@ -108,11 +125,12 @@ impl<'a> Frame<'a> {
         Ok(length)
     }
 
-    /// From the bytes of one datagram or packet.
+    /// From the bytes of one datagram or packet. Of a signed frame ([`crate::Key`]) the tag is not tested.
     ///
     /// # Errors
     /// [`FrameError`]; the checksum is tested before version and kind.
     pub fn read(bytes: &'a [u8]) -> Result<Self, FrameError> {
+        let bytes = parts(bytes).map_or(bytes, |(frame, _)| frame);
         let length = FrameError::Length(bytes.len());
         if bytes.len() > LARGEST_FRAME {
             return Err(length);

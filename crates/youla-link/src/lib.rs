@@ -14,7 +14,8 @@
 //! | 20 .. n - 4 | body |
 //! | last 4 | CRC-32 (ISO-HDLC) of all bytes before |
 //!
-//! The machine counts the requests of each host apart, and executes a [`Request::Stop`] of any host always.
+//! The machine counts the requests of each host apart, and executes a [`Request::Stop`] of any host always. With a [`Key`] that machine and hosts
+//! share, each frame is signed, and a machine executes nothing else of anybody without it.
 //!
 //! All numbers are little-endian. The bodies are [`RowBlock`]s from the machine, [`Request`]s from the host, and a [`Reply`] to each
 //! request. [`Tracker`] finds what was lost, doubled or reordered on the way. [`Station`] is the machine's end: a
@@ -31,6 +32,7 @@ extern crate std;
 
 mod bytes;
 mod frame;
+mod key;
 mod old;
 mod peers;
 mod request;
@@ -39,7 +41,8 @@ mod serial;
 mod station;
 mod tracker;
 
-pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, VERSION};
+pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, LARGEST_SIGNED, VERSION};
+pub use key::{Key, refuse_unsigned};
 pub use old::{OLD_VERSION, write_old_describe};
 pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, Source};
 pub use rows::{RowBatch, RowBlock, RowShape, RowView};

@@ -1,7 +1,8 @@
 //! The hosts that have changed something on a machine, each with the number of its last request.
 //!
 //! A request that only reads takes no place, and a stop needs none, so that no number of hosts keeps one out. A host that changes something
-//! takes the place of the one that was silent for longest, but never of the one that armed the machine.
+//! takes the place of the one that was silent for longest, but never of the one that armed the machine. The largest number of those that have lost
+//! their places is kept: a host without a place begins above it, so that no request of a host that is forgotten is executed again.
 
 use crate::{Frame, Outcome};
 use youla_rt::Checksum;
@@ -31,22 +32,33 @@ struct Peer {
 
 /// The one that was heard last comes first.
 #[derive(Debug, Clone)]
-pub(crate) struct Peers([Option<Peer>; PLACES]);
+pub(crate) struct Peers {
+    places: [Option<Peer>; PLACES],
+    /// The largest number of a host that has lost its place.
+    forgotten: Option<u32>,
+}
 
 impl Peers {
-    pub(crate) const NONE: Peers = Peers([None; PLACES]);
+    pub(crate) const NONE: Peers = Peers { places: [None; PLACES], forgotten: None };
 
     fn place(&self, host: u32) -> Option<usize> {
-        self.0.iter().position(|peer| peer.is_some_and(|peer| peer.host == host))
+        self.places.iter().position(|peer| peer.is_some_and(|peer| peer.host == host))
     }
 
     pub(crate) fn number(&self, frame: &Frame<'_>) -> Number {
-        let Some(peer) = self.0.iter().flatten().find(|peer| peer.host == frame.host) else { return Number::New };
-        match frame.sequence.wrapping_sub(peer.sequence) {
-            0 if peer.request == checksum(frame.body) => Number::Again(peer.outcome),
-            ahead if 0 < ahead && ahead <= u32::MAX / 2 => Number::New,
+        match self.places.iter().flatten().find(|peer| peer.host == frame.host) {
+            Some(peer) if peer.sequence == frame.sequence && peer.request == checksum(frame.body) => {
+                Number::Again(peer.outcome)
+            }
+            Some(peer) if is_later(frame.sequence, peer.sequence) => Number::New,
+            None if self.forgotten.is_none_or(|forgotten| is_later(frame.sequence, forgotten)) => Number::New,
             _ => Number::Late,
         }
+    }
+
+    /// The number above which a host without a place begins.
+    pub(crate) fn above(&self, host: u32) -> Option<u32> {
+        self.forgotten.filter(|_| self.place(host).is_none())
     }
 
     /// A new request of a host that has a place already.
@@ -58,21 +70,30 @@ impl Peers {
 
     /// A new request, for which its host takes a place; the host `kept` keeps its own.
     pub(crate) fn changed(&mut self, frame: &Frame<'_>, outcome: Outcome, kept: Option<u32>) {
-        let free = self.0.iter().rposition(|peer| peer.is_none_or(|peer| Some(peer.host) != kept));
-        if let Some(place) = self.place(frame.host).or(free) {
-            self.put(place, frame, outcome);
+        let free = self.places.iter().rposition(|peer| peer.is_none_or(|peer| Some(peer.host) != kept));
+        let own = self.place(frame.host);
+        let Some(place) = own.or(free) else { return };
+        let before = self.places.get(place).copied().flatten().filter(|_| own.is_none()).map(|peer| peer.sequence);
+        if let Some(before) = before.filter(|before| self.forgotten.is_none_or(|most| is_later(*before, most))) {
+            self.forgotten = Some(before);
         }
+        self.put(place, frame, outcome);
     }
 
     fn put(&mut self, place: usize, frame: &Frame<'_>, outcome: Outcome) {
         let (host, sequence, request) = (frame.host, frame.sequence, checksum(frame.body));
-        if let Some(up_to_place) = self.0.get_mut(..=place) {
+        if let Some(up_to_place) = self.places.get_mut(..=place) {
             up_to_place.rotate_right(1);
         }
-        if let Some(first) = self.0.first_mut() {
+        if let Some(first) = self.places.first_mut() {
             *first = Some(Peer { host, sequence, request, outcome });
         }
     }
+}
+
+/// In a count that begins again from 0.
+fn is_later(number: u32, before: u32) -> bool {
+    number != before && number.wrapping_sub(before) <= u32::MAX / 2
 }
 
 fn checksum(body: &[u8]) -> u32 {

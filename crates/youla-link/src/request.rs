@@ -168,14 +168,17 @@ pub enum Outcome {
     NoQ = 11,
     /// The excitation that was asked for is not possible.
     Source = 12,
-    /// Older than the last request of its host: late on the way, not executed.
+    /// Older than the last request of its host: late on the way, not executed. To a host without a place, the data are the number (`u32`) above
+    /// which it begins.
     Stale = 13,
     /// Made for the machine before it started again.
     OtherLife = 14,
+    /// Not signed with the key of the machine.
+    Key = 15,
 }
 
 impl Outcome {
-    const ALL: [Outcome; 15] = [
+    const ALL: [Outcome; 16] = [
         Outcome::Done,
         Outcome::NotUnderstood,
         Outcome::OtherSchema,
@@ -191,6 +194,7 @@ impl Outcome {
         Outcome::Source,
         Outcome::Stale,
         Outcome::OtherLife,
+        Outcome::Key,
     ];
 }
 
@@ -205,7 +209,7 @@ pub struct Reply<'a> {
     pub status: Status,
     /// Number of the sample that comes next.
     pub sample: u64,
-    /// The description (text), or coefficients of Q.
+    /// The description (text), coefficients of Q, or a number ([`Outcome::Stale`]).
     pub data: &'a [u8],
 }
 

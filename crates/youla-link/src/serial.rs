@@ -1,9 +1,9 @@
 //! Frames on a serial line: COBS packets, each after and before a zero byte.
 
-use crate::{FrameError, LARGEST_FRAME};
+use crate::{FrameError, LARGEST_SIGNED};
 
 /// Bytes of the longest packet, with its zeros.
-pub const LARGEST_PACKET: usize = LARGEST_FRAME + LARGEST_FRAME / 254 + 3;
+pub const LARGEST_PACKET: usize = LARGEST_SIGNED + LARGEST_SIGNED / 254 + 3;
 
 /// The bytes of a frame as a packet into the front of a buffer; returns their number. The zero at the front ends whatever the line
 /// held before.
@@ -14,7 +14,7 @@ pub fn write_packet(frame: &[u8], buffer: &mut [u8]) -> Result<usize, FrameError
     let too_long = FrameError::Length(frame.len());
     // COBS adds a byte and one more for each 254.
     let encoded = frame.len() + 1 + frame.len() / 254;
-    if frame.len() > LARGEST_FRAME || buffer.len() < encoded + 2 {
+    if frame.len() > LARGEST_SIGNED || buffer.len() < encoded + 2 {
         return Err(too_long);
     }
     let (first, rest) = buffer.split_first_mut().ok_or(too_long)?;

@@ -125,7 +125,8 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         self.running.stop();
     }
 
-    /// Takes a frame of a host and writes the reply; `None` for a frame that is no request.
+    /// Takes a frame of a host and writes the reply; `None` for a frame that is no request. A machine with a key asks [`crate::Key::admits`] before, and
+    /// signs what it sends: neither is computed here, so that both may wait for a moment without a sample.
     ///
     /// # Errors
     /// [`FrameError`] of the frame, or of a buffer that is too short for the reply.
@@ -256,8 +257,10 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
     ) -> Result<usize, FrameError> {
         let mut coefficients = [0; 4 * LARGEST_CHUNK];
         let mut outcome = outcome;
+        let above = self.peers.above(frame.host).map(u32::to_le_bytes);
         let data = match asked {
             Some(Request::Describe) => self.machine.description.as_bytes(),
+            _ if outcome == Outcome::Stale => above.as_ref().map_or(&[][..], |above| above),
             Some(Request::ReadQ { place }) if outcome == Outcome::Done => match self.read_q(place, &mut coefficients) {
                 Some(length) => coefficients.get(..length).unwrap_or_default(),
                 None => {

@@ -3,6 +3,7 @@
 mod exploration;
 mod firmware;
 mod hosts;
+mod keys;
 
 use crate::*;
 use proptest::prelude::*;

@@ -23,7 +23,8 @@ pub enum Error {
     Connection(#[from] std::io::Error),
     /// No reply.
     #[error(
-        "the rig at {address} does not answer; check that it runs, and that no firewall and no other speed of the line keeps its frames"
+        "the rig at {address} does not answer; check that it runs, that no firewall and no other speed of the line keeps its frames, and that the address \
+         names its key if it has one"
     )]
     Silent {
         /// Where it was asked.
@@ -48,6 +49,22 @@ pub enum Error {
         request: &'static str,
         /// Its outcome.
         outcome: Outcome,
+    },
+    /// The key of an address cannot be used.
+    #[error("{}: {problem}; a key is a file of 64 hexadecimal digits, and `youla rig key FILE` makes one", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Replies come without an authentication tag.
+    #[error(
+        "the rig at {address} replies without the key: it has none; leave out \",key=FILE\", or give the rig this key"
+    )]
+    Unsigned {
+        /// Where it was asked.
+        address: String,
     },
     /// The description of the machine cannot be used.
     #[error("the description of the rig: {0}")]
@@ -78,6 +95,9 @@ fn of_outcome(outcome: Outcome) -> &'static str {
         Outcome::NoQ => "no Q is loaded",
         Outcome::Source => "it cannot make this excitation",
         Outcome::Stale => "the request came too late",
+        Outcome::Key => {
+            "it executes what is signed with its key only; put \",key=FILE\" with the file of that key behind the address"
+        }
         Outcome::OtherLife => "it has started again in the meantime; connect again",
     }
 }

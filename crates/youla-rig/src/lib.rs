@@ -1,9 +1,10 @@
 //! The host's end of a rig that speaks `youla-link`: [`Rig`] asks and receives, [`Recorder`] writes a log in which every row is there or
 //! reported missing, and [`settings`] the run.toml beside it. [`serve`] plays a machine over UDP: the loop of the firmware with any
-//! [`Plant`], a [`LinearPlant`] for example, in real time or in lock-step.
+//! [`Plant`], a [`LinearPlant`] for example, in real time or in lock-step. Where both have a key ([`read_key`]), each frame is signed.
 
 mod description;
 mod error;
+mod key;
 mod plant;
 mod recorder;
 mod rig;
@@ -14,12 +15,13 @@ mod way;
 
 pub use description::{Description, RigChannel};
 pub use error::{Error, Result};
+pub use key::{read_key, write_key};
 pub use plant::{LinearPlant, Plant, PlantFault};
 pub use recorder::{LogPart, LogReport, Recorder};
 pub use rig::{Answer, Rig, random_number};
 pub use settings::settings;
 pub use sink::{CsvLog, LogRow, PlotStream, RowSink};
-pub use twin::{Pace, RotorStation, Twin, rotor, serve};
+pub use twin::{Pace, Port, RotorStation, Twin, rotor, serve};
 pub use youla_link::{Outcome, Request, Source};
 pub use youla_rt::{Cause, Phase, Status, Trip};
 

@@ -20,7 +20,7 @@ pub struct LogReport {
     pub frames: Tracker,
     /// Datagrams that are no frames: damaged on the way, or of another program.
     pub damaged: u64,
-    /// Frames with another description of the machine, or with rows that do not fit it.
+    /// Frames with another description of the machine, with rows that do not fit it, or not signed where there is a key.
     pub foreign: u64,
     /// Frames of another life of the machine, or far from the rows before, that no neighbour confirmed: they are not in the log.
     pub implausible: u64,
@@ -84,6 +84,8 @@ pub struct Recorder {
     /// Rows of the longest frame.
     of_frame: u64,
     trip: Option<Trip>,
+    /// Each frame is signed: one of this life that is behind was sent again by a stranger.
+    pub(crate) signed: bool,
     report: LogReport,
 }
 
@@ -114,6 +116,7 @@ impl Recorder {
             behind: 0,
             of_frame: 0,
             trip: None,
+            signed: false,
             report: LogReport::default(),
         }
     }
@@ -122,6 +125,11 @@ impl Recorder {
     pub fn take_largest(&mut self) -> Vec<f32> {
         let zeros = vec![0.0; self.largest.len()];
         std::mem::replace(&mut self.largest, zeros)
+    }
+
+    /// Frames of other senders, which were told by their signatures.
+    pub(crate) fn refuse(&mut self, frames: u64) {
+        self.report.foreign += frames;
     }
 
     /// Takes the bytes of a datagram or packet.
@@ -174,7 +182,7 @@ impl Recorder {
     fn go_on(&mut self, [(before, block), (place, rows)]: [(Place, Block); 2]) -> Result<()> {
         let newest = self.newest.filter(|newest| newest.life == place.life);
         let onward = newest.is_some_and(|newest| before.first > newest.first);
-        if newest.is_some() && !onward && self.behind < WAITING {
+        if newest.is_some() && !onward && (self.signed || self.behind < WAITING) {
             // A few that are very late; if nothing else comes, what was taken before was forged.
             self.behind += 1;
             self.report.frames.stale += 1;

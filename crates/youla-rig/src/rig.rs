@@ -1,11 +1,15 @@
 //! Requests to a machine, and its rows.
 
+use crate::key::read_key;
 use crate::way::Way;
 use crate::{Description, Error, Recorder, Result};
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, RandomState};
+use std::path::Path;
 use std::time::{Duration, Instant};
-use youla_link::{Frame, FrameError, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request, write_old_describe};
+use youla_link::{
+    Frame, FrameError, Key, Kind, LARGEST_CHUNK, LARGEST_SIGNED, Outcome, Reply, Request, write_old_describe,
+};
 use youla_rt::{Checksum, Status};
 
 /// The reply to a request.
@@ -38,6 +42,10 @@ pub struct Rig {
     version: Option<u8>,
     /// Frames that came while a reply was awaited.
     inbox: VecDeque<Vec<u8>>,
+    key: Option<Key>,
+    /// Frames that are not signed with the key, and what the machine itself may have replied among them.
+    refused: u64,
+    unsigned: Option<Answer>,
 }
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -46,25 +54,40 @@ const ATTEMPTS: usize = 10;
 const ASK_OLD: usize = 2;
 
 impl Rig {
-    /// Connects to `udp://HOST:PORT` or `serial:DEVICE[@BAUD]` and asks for the description.
+    /// Connects to `udp://HOST:PORT` or `serial:DEVICE[@BAUD]`, with `,key=FILE` behind it for a machine with a key, and asks for the description.
     ///
     /// # Errors
-    /// [`Error::Address`], [`Error::Silent`], [`Error::Version`], [`Error::Description`].
+    /// [`Error::Address`], [`Error::Key`], [`Error::Silent`], [`Error::Unsigned`], [`Error::Version`], [`Error::Description`].
     pub fn connect(address: &str) -> Result<Self> {
-        Self::over(Way::open(address)?, address)
+        let mut rig = Self::open(address)?;
+        rig.describe()?;
+        Ok(rig)
     }
 
-    /// Stops the excitation, whatever the machine is, then asks for the description.
+    /// Stops the excitation, whatever the machine is, then asks for the description. A machine with a key stops for a host without it too, but does
+    /// not describe itself; its address stands for its name then.
     ///
     /// # Errors
     /// As [`Rig::connect`].
     pub fn stop(address: &str) -> Result<(Self, Answer)> {
-        let mut rig = Self::unknown(Way::open(address)?, address);
+        let mut rig = Self::open(address)?;
         let answer = rig.ask(&Request::Stop)?;
-        rig.describe()?;
+        match rig.describe() {
+            Err(Error::Refused { outcome: Outcome::Key, .. }) => rig.description.name.clone_from(&rig.address),
+            described => described?,
+        }
         Ok((rig, answer))
     }
 
+    fn open(address: &str) -> Result<Self> {
+        let (place, key) = match address.rsplit_once(",key=") {
+            Some((place, file)) => (place, Some(read_key(Path::new(file))?)),
+            None => (address, None),
+        };
+        Ok(Rig { key, ..Self::unknown(Way::open(place)?, place) })
+    }
+
+    #[cfg(all(unix, test))]
     pub(crate) fn over(way: Way, address: &str) -> Result<Self> {
         let mut rig = Self::unknown(way, address);
         rig.describe()?;
@@ -82,6 +105,9 @@ impl Rig {
             life: 0,
             version: None,
             inbox: VecDeque::new(),
+            key: None,
+            refused: 0,
+            unsigned: None,
         }
     }
 
@@ -107,17 +133,33 @@ impl Rig {
     /// Asks until there is a reply; rows that come in between are kept.
     ///
     /// # Errors
-    /// [`Error::Silent`], [`Error::Version`], [`Error::Refused`], [`Error::Connection`].
+    /// [`Error::Silent`], [`Error::Unsigned`], [`Error::Version`], [`Error::Refused`], [`Error::Connection`].
     pub fn ask(&mut self, request: &Request<'_>) -> Result<Answer> {
+        let mut answer = self.answer(request)?;
+        if let (Outcome::Stale, Ok(above)) = (answer.outcome, answer.data.as_slice().try_into()) {
+            // The machine does not know this host: its numbers begin above those of the hosts that are forgotten.
+            self.sequence = u32::from_le_bytes(above);
+            answer = self.answer(request)?;
+        }
+        match answer.outcome {
+            Outcome::Done => Ok(answer),
+            outcome => Err(Error::Refused { request: name(request), outcome }),
+        }
+    }
+
+    fn answer(&mut self, request: &Request<'_>) -> Result<Answer> {
+        self.unsigned = None;
         self.sequence = self.sequence.wrapping_add(1);
         let mut body = [0; 4 * LARGEST_CHUNK + 8];
         let too_long = || Error::Description("a request is longer than a frame".into());
         let length = request.write(&mut body).ok_or_else(too_long)?;
-        let mut bytes = [0; LARGEST_FRAME];
+        let mut bytes = [0; LARGEST_SIGNED];
         let body = body.get(..length).unwrap_or_default();
         let Rig { schema, sequence, host, life, .. } = *self;
         let frame = Frame { kind: Kind::Request, schema, sequence, host, life, body };
         let length = frame.write(&mut bytes).map_err(|_| too_long())?;
+        let length =
+            self.key.as_ref().map_or(Ok(length), |key| key.sign(&mut bytes, length)).map_err(|_| too_long())?;
         for attempt in 0..ATTEMPTS {
             self.way.send(bytes.get(..length).unwrap_or_default());
             if attempt == ASK_OLD && self.schema == 0 {
@@ -126,25 +168,39 @@ impl Rig {
                 self.way.send(old.get(..length).unwrap_or_default());
             }
             if let Some(answer) = self.await_answer()? {
-                return match answer.outcome {
-                    Outcome::Done => Ok(answer),
-                    outcome => Err(Error::Refused { request: name(request), outcome }),
-                };
+                return Ok(answer);
             }
             if self.schema == 0 && self.version.is_some() {
                 break;
             }
         }
         let address = self.address.clone();
-        Err(self
-            .version
-            .map_or(Error::Silent { address: address.clone() }, |version| Error::Version { address, version }))
+        Err(match (self.version, &self.unsigned) {
+            (_, Some(Answer { outcome: Outcome::Key, .. })) => {
+                Error::Refused { request: name(request), outcome: Outcome::Key }
+            }
+            (_, Some(_)) => Error::Unsigned { address },
+            (Some(version), None) => Error::Version { address, version },
+            (None, None) => Error::Silent { address },
+        })
+    }
+
+    /// Bytes that this host may take, within a time: where there is a key, frames that are signed with it, and damaged ones.
+    fn receive(&mut self, within: Duration) -> Result<Option<Vec<u8>>> {
+        let received = self.way.receive(within)?;
+        let (Some(key), Some(bytes)) = (&self.key, &received) else { return Ok(received) };
+        if matches!(key.verify(bytes), Err(FrameError::Unsigned | FrameError::Key)) {
+            self.refused += 1;
+            self.unsigned = answer_to([self.host, self.sequence], bytes).or(self.unsigned.take());
+            return Ok(None);
+        }
+        Ok(received)
     }
 
     fn await_answer(&mut self) -> Result<Option<Answer>> {
         let until = Instant::now() + PATIENCE;
         while let Some(left) = until.checked_duration_since(Instant::now()) {
-            let Some(bytes) = self.way.receive(left)? else { continue };
+            let Some(bytes) = self.receive(left)? else { continue };
             if let Err(FrameError::Version(version)) = Frame::read(&bytes) {
                 self.version = Some(version);
             }
@@ -162,12 +218,15 @@ impl Rig {
     /// [`Error::Connection`], [`Error::File`].
     pub fn record(&mut self, recorder: &mut Recorder, within: Duration) -> Result<()> {
         let until = Instant::now() + within;
+        recorder.signed = self.key.is_some();
         loop {
+            recorder.refuse(std::mem::take(&mut self.refused));
             while let Some(bytes) = self.inbox.pop_front() {
                 recorder.take(&bytes)?;
             }
             let Some(left) = until.checked_duration_since(Instant::now()) else { return Ok(()) };
-            self.inbox.extend(self.way.receive(left)?);
+            let received = self.receive(left)?;
+            self.inbox.extend(received);
         }
     }
 

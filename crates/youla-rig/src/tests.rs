@@ -7,11 +7,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use youla_link::{LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
+use youla_link::{Key, LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
 use youla_rt::{Cause, Controller, ExcitedLoop, Limits, Matrices, OUT_WITHIN, Phase, QCoefficients};
 
 mod board;
 mod faults;
+mod keys;
 
 /// A rotor that is served on a thread.
 struct Served {
@@ -22,12 +23,13 @@ struct Served {
 
 impl Served {
     fn start(pace: Pace) -> Self {
-        Self::of(|| rotor(1).unwrap(), pace)
+        Self::of(|| rotor(1).unwrap(), pace, None)
     }
 
     fn of<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P> + 'static>(
         make: fn() -> Twin<'static, N, M, P, K, G>,
         pace: Pace,
+        key: Option<Key>,
     ) -> Self {
         let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
         let address = format!("udp://{}", socket.local_addr().unwrap());
@@ -35,7 +37,8 @@ impl Served {
         let end = over.clone();
         let thread = std::thread::spawn(move || {
             let mut twin = make();
-            serve(&socket, &mut twin, pace, || end.load(Ordering::Relaxed)).unwrap();
+            let port = Port { socket: &socket, key: key.as_ref() };
+            serve(port, &mut twin, pace, || end.load(Ordering::Relaxed)).unwrap();
         });
         Served { address, over, thread }
     }
@@ -248,7 +251,7 @@ fn hardening() -> Twin<'static, 2, 1, 1, 1, Hardening> {
 /// A plant that is not linear, of another size: the log over UDP has the bits of the loop without a way in between.
 #[test]
 fn any_plant_over_udp() {
-    let served = Served::of(hardening, Pace::LockStep);
+    let served = Served::of(hardening, Pace::LockStep, None);
     let mut rig = Rig::connect(&served.address).unwrap();
     let path = file("hardening");
     let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();

@@ -6,7 +6,7 @@ use crate::way::received;
 use crate::{Error, Result};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
-use youla_link::{LARGEST_FRAME, Machine, Station};
+use youla_link::{Key, LARGEST_SIGNED, Machine, Station, refuse_unsigned};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices, Row};
 
 /// How a twin takes its time.
@@ -38,12 +38,30 @@ impl<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M,
     }
 }
 
+/// Where hosts reach a twin.
+#[derive(Debug, Clone, Copy)]
+pub struct Port<'a> {
+    /// Datagrams from any host.
+    pub socket: &'a UdpSocket,
+    /// The key that it shares with its hosts.
+    pub key: Option<&'a Key>,
+}
+
+impl Port<'_> {
+    /// Signs the frame in the front of a buffer where there is a key, and sends it. A datagram that cannot be sent is lost; its number says so.
+    fn send(&self, buffer: &mut [u8], length: usize, to: impl Iterator<Item = SocketAddr>) {
+        let signed = self.key.map_or(Ok(length), |key| key.sign(buffer, length));
+        let bytes = signed.ok().and_then(|length| buffer.get(..length)).unwrap_or_default();
+        to.for_each(|host| _ = self.socket.send_to(bytes, host));
+    }
+}
+
 /// Serves a twin until `end` says so. Rows go to each host that asked within the last second.
 ///
 /// # Errors
 /// [`Error::Connection`].
 pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
-    socket: &UdpSocket,
+    port: Port<'_>,
     twin: &mut Twin<'_, N, M, P, K, G>,
     pace: Pace,
     end: impl Fn() -> bool,
@@ -51,18 +69,18 @@ pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize, G: 
     let begin = Instant::now();
     let mut hosts = Hosts::default();
     let mut done = 0_u64;
-    socket.set_read_timeout(Some(Duration::from_micros(500)))?;
+    port.socket.set_read_timeout(Some(Duration::from_micros(500)))?;
     while !end() {
-        let asked = take_requests(socket, twin, &mut hosts, pace)?;
+        let asked = take_requests(port, twin, &mut hosts, pace)?;
         match pace {
             Pace::RealTime(period) => {
                 let due = begin.elapsed().as_nanos() / period.as_nanos().max(1);
                 while u128::from(done) < due {
                     done += 1;
-                    step(socket, twin, &hosts)?;
+                    step(port, twin, &hosts)?;
                 }
             }
-            Pace::LockStep if asked => while !step(socket, twin, &hosts)? {},
+            Pace::LockStep if asked => while !step(port, twin, &hosts)? {},
             Pace::LockStep => (),
         }
     }
@@ -97,55 +115,56 @@ const REQUESTS: usize = 256;
 
 /// Whether there was a request. In lock-step one at a time.
 fn take_requests<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
-    socket: &UdpSocket,
+    port: Port<'_>,
     twin: &mut Twin<'_, N, M, P, K, G>,
     hosts: &mut Hosts,
     pace: Pace,
 ) -> Result<bool> {
-    let asked = take_request(socket, twin, hosts)?;
+    let asked = take_request(port, twin, hosts)?;
     if pace != Pace::LockStep && asked {
-        socket.set_nonblocking(true)?;
+        port.socket.set_nonblocking(true)?;
         let mut further = 1;
-        while further < REQUESTS && take_request(socket, twin, hosts)? {
+        while further < REQUESTS && take_request(port, twin, hosts)? {
             further += 1;
         }
-        socket.set_nonblocking(false)?;
+        port.socket.set_nonblocking(false)?;
     }
     Ok(asked)
 }
 
 /// Whether there was a request.
 fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
-    socket: &UdpSocket,
+    port: Port<'_>,
     twin: &mut Twin<'_, N, M, P, K, G>,
     hosts: &mut Hosts,
 ) -> Result<bool> {
     let mut bytes = [0; 2048];
-    let Some((length, from)) = received(socket.recv_from(&mut bytes))? else { return Ok(false) };
-    let mut reply = [0; LARGEST_FRAME];
+    let Some((length, from)) = received(port.socket.recv_from(&mut bytes))? else { return Ok(false) };
+    let mut reply = [0; LARGEST_SIGNED];
     let request = bytes.get(..length).unwrap_or_default();
+    if port.key.is_some_and(|key| !key.admits(request)) {
+        let refused = refuse_unsigned(request, &mut reply);
+        let unsigned = Port { key: None, ..port };
+        refused.into_iter().for_each(|length| unsigned.send(&mut reply, length, std::iter::once(from)));
+        return Ok(false);
+    }
     let Ok(Some(length)) = twin.station.receive(request, &mut reply) else { return Ok(false) };
     hosts.heard(from);
-    send(socket, reply.get(..length).unwrap_or_default(), from);
+    port.send(&mut reply, length, std::iter::once(from));
     Ok(true)
 }
 
 /// One sample; whether a frame was complete.
 fn step<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
-    socket: &UdpSocket,
+    port: Port<'_>,
     twin: &mut Twin<'_, N, M, P, K, G>,
     hosts: &Hosts,
 ) -> Result<bool> {
     twin.sample();
-    let mut bytes = [0; LARGEST_FRAME];
+    let mut bytes = [0; LARGEST_SIGNED];
     let Some(Ok(length)) = twin.station.frame(&mut bytes) else { return Ok(false) };
-    hosts.present().for_each(|host| send(socket, bytes.get(..length).unwrap_or_default(), host));
+    port.send(&mut bytes, length, hosts.present());
     Ok(true)
-}
-
-/// A datagram that cannot be sent is lost; its sequence number says so.
-fn send(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) {
-    let _ = socket.send_to(bytes, to);
 }
 
 /// The station of [`rotor`].

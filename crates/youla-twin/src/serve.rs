@@ -9,14 +9,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::Serialize;
-use std::net::UdpSocket;
 use std::path::Path;
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::export::NamedModel;
 use youla_link::{LARGEST_BODY, Machine, Station};
-use youla_rig::{Pace, Plant, RigChannel, Twin, random_number, serve};
+use youla_rig::{Pace, Plant, Port, RigChannel, Twin, random_number, serve};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices};
 
 /// Largest order of the nominal model.
@@ -66,7 +65,7 @@ impl TwinPlant {
 /// # Errors
 /// Those of the file; [`Error::Loop`] for a plant that does not fit its loop; [`Error::Connection`].
 pub fn serve_loop(
-    socket: &UdpSocket,
+    port: Port<'_>,
     path: &Path,
     plant: &TwinPlant,
     (seed, lock_step): (u64, bool),
@@ -78,7 +77,7 @@ pub fn serve_loop(
         true => Pace::LockStep,
         false => Pace::RealTime(std::time::Duration::from_secs_f64(time.ts())),
     };
-    let served = Served { socket, path, running: &running, plant, seed, pace };
+    let served = Served { port, path, running: &running, plant, seed, pace };
     match plant.channels().map(|channels| channels.len()) {
         [1, 1] => served.run::<1, 1>(&end),
         [1, 2] => served.run::<1, 2>(&end),
@@ -92,7 +91,7 @@ pub fn serve_loop(
 }
 
 struct Served<'a> {
-    socket: &'a UdpSocket,
+    port: Port<'a>,
     path: &'a Path,
     running: &'a RunningLoop,
     plant: &'a TwinPlant,
@@ -155,7 +154,7 @@ impl Served<'_> {
         mut twin: Twin<'_, STATES, M, P, Q_STATES, G>,
         end: &impl Fn() -> bool,
     ) -> Result<()> {
-        Ok(serve(self.socket, &mut twin, self.pace, end)?)
+        Ok(serve(self.port, &mut twin, self.pace, end)?)
     }
 
     fn matrices<const M: usize, const P: usize>(&self) -> Matrices<f32, STATES, M, P> {

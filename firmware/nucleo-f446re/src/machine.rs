@@ -18,6 +18,9 @@ const ROWS: u16 = 16;
 /// Bytes of the longest frame between the interrupt and the serial port: rows, or the reply with the description.
 pub(crate) const ROOM: usize = 768;
 
+/// The key that hosts have as well, the 32 bytes of a file of `youla rig key`; without it whoever reaches the serial port commands the machine.
+pub(crate) const KEY: Option<[u8; 32]> = None;
+
 /// The host copies it into the run.toml of a log, so model and gains must be those below.
 const DESCRIPTION: &str = r#"name = "low-pass"
 sample_time = 2e-4

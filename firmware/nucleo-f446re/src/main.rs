@@ -28,7 +28,7 @@ use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{bind_interrupts, dma, interrupt, pac, peripherals, rcc};
 use static_cell::{ConstStaticCell, StaticCell};
-use youla_link::{LARGEST_PACKET, PacketReader, is_stop, write_packet};
+use youla_link::{Key, LARGEST_PACKET, LARGEST_SIGNED, PacketReader, is_stop, write_packet};
 use youla_rt::Checksum;
 
 bind_interrupts!(struct Irqs {
@@ -124,12 +124,22 @@ async fn main(spawner: Spawner) {
     unsafe { interrupt::TIM2.enable() };
 }
 
-/// Frames to the host, by DMA.
+/// Frames to the host, signed where the machine has a key, by DMA. The test of the constant keeps HMAC out of an image without a key.
 #[embassy_executor::task]
 async fn send(mut port: UartTx<'static, Async>, mut frames: Receiving) {
     let mut packet = [0; LARGEST_PACKET];
+    let key = machine::KEY.map(|bytes| Key::new(&bytes));
     loop {
-        let written = write_packet(frames.receive().await.frame(), &mut packet);
+        let frame = frames.receive().await.frame();
+        let written = match &key {
+            Some(key) if machine::KEY.is_some() => {
+                let mut signed = [0; LARGEST_SIGNED];
+                signed.iter_mut().zip(frame).for_each(|(to, from)| *to = *from);
+                let length = key.sign(&mut signed, frame.len());
+                length.and_then(|length| write_packet(signed.get(..length).unwrap_or_default(), &mut packet))
+            }
+            _ => write_packet(frame, &mut packet),
+        };
         frames.receive_done();
         let bytes = written.ok().and_then(|length| packet.get(..length)).unwrap_or_default();
         // A packet that is damaged or lost shows in its checksum and its number.
@@ -141,12 +151,16 @@ async fn send(mut port: UartTx<'static, Async>, mut frames: Receiving) {
 #[embassy_executor::task]
 async fn receive(mut port: RingBufferedUartRx<'static>, mut requests: Sending) {
     let mut packets = PacketReader::new();
+    let key = machine::KEY.map(|bytes| Key::new(&bytes));
     let mut bytes = [0; 64];
     loop {
         // After an error of the line the host asks again.
         let count = port.read(&mut bytes).await.unwrap_or(0);
         for byte in bytes.iter().take(count) {
             let Some(Ok(frame)) = packets.push(*byte) else { continue };
+            if machine::KEY.is_some() && key.as_ref().is_some_and(|key| !key.admits(frame)) {
+                continue;
+            }
             // It waits for no place among the requests.
             if is_stop(frame) {
                 STOP.store(true, Ordering::Relaxed);

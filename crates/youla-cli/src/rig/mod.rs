@@ -9,12 +9,19 @@ use clap::Subcommand;
 use load::{LoadArgs, load};
 use record::{ExciteArgs, RecordArgs, excite, record};
 use serde_json::json;
+use std::path::PathBuf;
 use std::time::Duration;
 use twin::{TwinArgs, twin};
 use youla::ErrorKind;
-use youla_rig::{Answer, Phase, Request, Rig};
+use youla_rig::{Answer, Phase, Request, Rig, write_key};
 
-const ADDRESS: &str = "Address of the machine, udp://HOST:PORT or serial:DEVICE[@BAUD].";
+const ADDRESS: &str = "Address of the machine, udp://HOST:PORT or serial:DEVICE[@BAUD], with ,key=FILE behind it for a machine with a key.";
+
+const KEY_EXAMPLES: &str = "\
+Examples:
+  youla rig key rig.key
+  youla rig twin --key rig.key
+  youla rig status udp://127.0.0.1:4000,key=rig.key";
 
 /// The verbs of a rig.
 #[derive(Debug, Subcommand)]
@@ -50,6 +57,12 @@ pub(crate) enum RigCommand {
         #[arg(long)]
         release: bool,
     },
+    /// Make the file of a key that a machine and its hosts share.
+    #[command(after_help = KEY_EXAMPLES)]
+    Key {
+        /// The new file: 64 hexadecimal digits, readable by its owner.
+        file: PathBuf,
+    },
 }
 
 impl From<youla_rig::Error> for Failure {
@@ -79,6 +92,19 @@ pub(crate) fn run(form: Form, command: &RigCommand) -> Result<(), Failure> {
                 answer = rig.ask(&Request::ReleaseQ)?;
             }
             say_status(form, &rig, &answer)
+        }
+        RigCommand::Key { file } => {
+            write_key(file)?;
+            form.print(
+                || json!({ "key": file }),
+                || {
+                    format!(
+                        "{}: a new key. Give it to the machine, and to its hosts as ,key={}",
+                        file.display(),
+                        file.display()
+                    )
+                },
+            )
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use youla_rig::{Pace, rotor, serve};
+use youla_rig::{Pace, Port, read_key, rotor, serve};
 use youla_run::model_for_export;
 use youla_twin::rig::Fidelity;
 use youla_twin::{TwinPlant, serve_loop};
@@ -42,6 +42,9 @@ pub(crate) struct TwinArgs {
     /// How it takes its time.
     #[arg(long, value_enum, default_value = "real-time")]
     pace: PaceName,
+    /// Take requests that are signed with the key in this file only, and a stop of anybody.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// End after so many seconds.
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
@@ -70,20 +73,22 @@ enum PaceName {
 pub(super) fn twin(form: Form, args: &TwinArgs) -> Result<(), Failure> {
     let until = args.duration.map(|value| seconds("--duration", value)).transpose()?;
     let plant = plant(args)?;
+    let key = args.key.as_deref().map(read_key).transpose()?;
     let socket = UdpSocket::bind(("127.0.0.1", args.port))
         .map_err(|e| refused(format!("--port {}: {e}; choose another port", args.port)))?;
     let place = socket.local_addr().map_err(|e| refused(e.to_string()))?;
     if !form.quiet {
         say(&format!("udp://{place}"))?;
     }
+    let port = Port { socket: &socket, key: key.as_ref() };
     let begin = Instant::now();
     let end = || until.is_some_and(|until| begin.elapsed() >= until);
     let lock_step = args.pace == PaceName::LockStep;
     match (&args.file, plant) {
-        (Some(file), Some(plant)) => Ok(serve_loop(&socket, file, &plant, (args.seed, lock_step), end)?),
+        (Some(file), Some(plant)) => Ok(serve_loop(port, file, &plant, (args.seed, lock_step), end)?),
         _ => {
             let pace = if lock_step { Pace::LockStep } else { Pace::RealTime(Duration::from_micros(50)) };
-            Ok(serve(&socket, &mut rotor(args.seed)?, pace, end)?)
+            Ok(serve(port, &mut rotor(args.seed)?, pace, end)?)
         }
     }
 }

@@ -74,10 +74,12 @@ fn requests_of_one_host_make_no_other_late() {
         assert_eq!(ask(&mut station, 2, sequence, Request::Alive), Outcome::Done);
     }
     assert_eq!(ask(&mut station, 1, 3, Request::BeginQ), Outcome::Done);
-    // Hosts that change something take all places but that of the host that armed.
+    // Hosts that change something take all places but that of the host that armed; a new one begins above those that are forgotten.
     for host in 10..30 {
-        assert_eq!(ask(&mut station, host, 5, Request::ReleaseQ), Outcome::Done);
+        let first = ask(&mut station, host, 5 + host, Request::ReleaseQ);
+        assert_eq!(first, Outcome::Done, "host {host}");
     }
+    assert_eq!(ask(&mut station, 9, 5, Request::ReleaseQ), Outcome::Stale);
     assert_eq!(ask(&mut station, 1, 3, Request::BeginQ), Outcome::Done);
     assert_eq!(ask(&mut station, 1, 2, Request::BeginQ), Outcome::Stale);
     assert_eq!(ask(&mut station, 1, 4, Request::Stop), Outcome::Done);

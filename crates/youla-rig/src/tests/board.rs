@@ -28,6 +28,7 @@ fn entry(table: &toml::Table, path: [&str; 3], row: usize, column: usize) -> f32
 
 #[test]
 fn description_states_the_numbers_that_run() {
+    assert_eq!(machine::KEY, None, "a key that is published is none");
     let mut board = rig(5).unwrap();
     let reply = ask(&mut board, 1, &Request::Describe);
     let description = Description::parse(Reply::read(Frame::read(&reply).unwrap().body).unwrap().data).unwrap();

@@ -25,9 +25,14 @@ fn rows(life: u32, sequence: u32, first: u64, mark: f32) -> Vec<u8> {
 }
 
 fn recorded(name: &str, frames: &[Vec<u8>]) -> (LogReport, PathBuf) {
+    recorded_by(name, frames, false)
+}
+
+fn recorded_by(name: &str, frames: &[Vec<u8>], signed: bool) -> (LogReport, PathBuf) {
     let path = file(name);
     let machine = Description::parse(MACHINE.as_bytes()).unwrap();
     let mut recorder = Recorder::create(&path, &machine, 7).unwrap();
+    recorder.signed = signed;
     frames.iter().for_each(|frame| recorder.take(frame).unwrap());
     (recorder.finish(0).unwrap(), path)
 }
@@ -83,6 +88,22 @@ fn forged_frames_do_not_end_a_log() {
     assert!(report.parts[1].rows >= (200 - 66) * ROWS && report.frames.stale >= 64, "{report:?}");
     assert!(marks(CsvLog::part_path(&path, 2)).iter().all(|mark| *mark == 1.0));
     let _ = marks(path);
+}
+
+/// Frames that a stranger has heard and sends again while those of the machine do not arrive. Without signatures nobody can tell them from a machine whose samples
+/// went back.
+#[test]
+fn signed_frames_that_come_again_are_no_part_of_the_log() {
+    let honest = |from: u32, to: u32| (from..to).map(|k| rows(1, k, ROWS * u64::from(k), 1.0));
+    let frames: Vec<Vec<u8>> = honest(0, 400).chain(honest(0, 200)).chain(honest(400, 500)).collect();
+    let (report, path) = recorded_by("again", &frames, true);
+    assert_eq!((report.rows, report.missing, report.parts.len()), (500 * ROWS, 0, 1), "{report:?}");
+    assert_eq!(marks(path), vec![1.0; 500 * ROWS as usize]);
+    let (report, path) = recorded("again-unsigned", &frames);
+    assert!(report.parts.len() > 1, "{report:?}");
+    let mut parts: Vec<PathBuf> = (2..=report.parts.len()).map(|number| CsvLog::part_path(&path, number)).collect();
+    parts.push(path);
+    parts.into_iter().for_each(|part| _ = marks(part));
 }
 
 #[test]

@@ -75,6 +75,34 @@ fn identify_takes_the_record_as_it_is() {
     assert!(nobody.code == Some(2) && nobody.stderr.contains("does not answer"), "{}", nobody.stderr);
 }
 
+/// From the key to the log of a machine that takes nothing else; a stop without the key.
+#[test]
+fn a_machine_with_a_key() {
+    let folder = empty_folder("rig-key");
+    let key = folder.join("rig.key").display().to_string();
+    assert!(youla(&folder, &["rig", "key", "rig.key"]).stdout.contains(",key=rig.key"));
+    let again = youla(&folder, &["rig", "key", "rig.key"]);
+    assert!(again.code == Some(2) && again.stderr.contains("rig.key: "), "{}", again.stderr);
+    let twin = Twin::start(&["--key", &key]);
+    let keyed = format!("{},key=rig.key", twin.address);
+    let record = |address: &str| {
+        youla(
+            &folder,
+            &["rig", "excite", address, "--amplitude", "0.5", "--out", "log.csv", "--duration", "0.5", "--json"],
+        )
+    };
+    let refused = record(&twin.address);
+    assert!(refused.code == Some(2) && refused.stderr.contains("put \",key=FILE\""), "{}", refused.stderr);
+    assert!(!folder.join("log.csv").exists());
+    let recorded = record(&keyed);
+    assert_eq!((recorded.code, recorded.stderr.as_str()), (Some(0), ""));
+    assert!(recorded.stdout.contains("\"foreign\":0"), "{}", recorded.stdout);
+    let stopped = youla(&folder, &["rig", "stop", &twin.address]);
+    assert!(stopped.code == Some(0) && stopped.stdout.contains("idle"), "{} {}", stopped.stdout, stopped.stderr);
+    let missing = youla(&folder, &["rig", "status", &format!("{},key=none.key", twin.address)]);
+    assert!(missing.code == Some(2) && missing.stderr.contains("none.key: "), "{}", missing.stderr);
+}
+
 /// A machine that starts again while it is recorded: two files, and the program says so.
 #[test]
 fn a_restart_parts_the_record() {

@@ -17,6 +17,9 @@ const CLOSE: f64 = 2e-4;
 /// Distance from the unit circle beyond which poles count as no further: fast poles differ enough in what they do.
 const FAST: f64 = 0.05;
 
+/// Poles on either side of the circle, as 0.997 and 1.001, are exactly as far from each other as both are from it: they overlap as two on one side do.
+const ACROSS: f64 = 1.01;
+
 /// Groups of poles and a basis that separates them.
 pub(crate) struct Grouped {
     /// Places of the poles of each block.
@@ -85,7 +88,7 @@ fn condition(t: &Mat<f64>) -> f64 {
 /// steps in them short.
 fn merge_overlapping(groups: &mut Vec<Vec<usize>>, poles: &[c64]) {
     let inside = |p: c64| (1.0 - p.norm()).abs().clamp(CLOSE, FAST);
-    let overlap = |a: c64, b: c64| (a - b).norm() < inside(a) + inside(b);
+    let overlap = |a: c64, b: c64| (a - b).norm() < ACROSS * (inside(a) + inside(b));
     let mut i = 0;
     while i < groups.len() {
         let other = (i + 1..groups.len()).find(|j| {

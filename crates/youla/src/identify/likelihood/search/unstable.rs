@@ -30,6 +30,10 @@ use faer::{Mat, c64};
 /// Exponent `N log p` of a real pole from which the term counts: such a pole is slower than a third of the record, so that the loop is faster than
 /// it. In a slower loop, and at a mode that the loop leaves alone, the residual of a stable pole has no slope.
 const HELD: f64 = -3.0;
+/// Angle over the record, rad, up to which a pole moves as a real one does.
+const SLOW: f64 = 1.0;
+/// Step of the second differences: the terms bend over 1 to 4.
+const CURVED: f64 = 0.25;
 /// Exponents below which the functions are power series.
 const SMALL: f64 = 0.1;
 const SMALL_BESIDE_RAMP: f64 = 4.0;
@@ -44,13 +48,22 @@ pub(crate) fn outside(spectra: &Spectra, poles: &[c64]) -> f64 {
 /// The same of poles near the circle too, summed over poles and records.
 pub(crate) fn growth(spectra: &Spectra, poles: &[c64]) -> f64 {
     let of = |p: &c64, samples: usize| {
-        let x = samples as f64 * p.norm().ln();
-        let real = p.im == 0.0 && p.re > 0.0;
-        let (term, from): (fn(f64) -> f64, f64) = if real { (beside_ramp, HELD) } else { (alone, 0.0) };
-        if spectra.held && x > from { term(x) - term(from) } else { 0.0 }
+        let (x, angle) = (samples as f64 * p.norm().ln(), samples as f64 * p.arg());
+        let slow = angle.abs() < SLOW;
+        let (term, from): (fn(f64) -> f64, f64) = if slow { (beside_ramp, HELD) } else { (alone, 0.0) };
+        match spectra.held && x > from {
+            true if slow => term(x) - term(from) - 0.5 * curvature(term, x) * angle * angle,
+            true => term(x) - term(from),
+            false => 0.0,
+        }
     };
     let of_record = |samples: usize| poles.iter().map(|p| of(p, samples)).sum::<f64>();
     spectra.records.iter().map(|lines| of_record(lines.samples)).sum()
+}
+
+/// Second derivative of a term: two real poles that meet go on as a pair, and the sum of their terms as `2 f(x) - f''(x) angle^2`.
+fn curvature(term: fn(f64) -> f64, x: f64) -> f64 {
+    (term(x + CURVED) - 2.0 * term(x) + term(x - CURVED)) / (CURVED * CURVED)
 }
 
 /// `x/2 + 1/2 log (sinh x / x)`.
@@ -161,6 +174,35 @@ mod tests {
             let [squares, growth] = mean_slopes(pole);
             assert!((squares - growth).abs() < 0.025, "{pole}: {squares} {growth}");
         }
+    }
+
+    /// Two poles near 1 in one block, from a real pair through a double pole to a complex one: the slope of the growth in an entry of A that
+    /// makes them meet is smooth. It was 1e9 where they met.
+    #[test]
+    fn poles_that_meet_have_a_smooth_growth() {
+        let record = Mat::zeros(SAMPLES, 1);
+        let unit = Sizes { u: vec![1.0], y: vec![1.0] };
+        let spectra = Spectra::new(&[Experiment::new(record.as_ref(), record.as_ref())], &unit, &[0], 0);
+        let ones = Mat::from_fn(2, 1, |_, _| 1.0);
+        let slope_at = |squared: f64| {
+            // Poles 0.9995 +- sqrt(squared).
+            let a = Mat::from_fn(2, 2, |i, j| [[0.9995, 1e-3], [1e3 * squared, 0.9995]][i][j]);
+            let model = Model::of(a.as_ref(), ones.as_ref(), ones.transpose(), vec![0.0]).unwrap();
+            assert_eq!(model.blocks.len(), 1);
+            let of = |a: f64| {
+                let mean = 0.9995;
+                let root = c64::new(a, 0.0).sqrt();
+                growth(&spectra, &[mean + root, mean - root])
+            };
+            let (h, chart) = (1e-12, Chart::by_outputs(&model, false));
+            let largest = slope(growth, &spectra, &model, &chart).iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+            ((of(squared + h) - of(squared - h)) / (2.0 * h), largest)
+        };
+        let slopes: Vec<(f64, f64)> = [-4e-8, -1e-8, -1e-10, 0.0, 1e-10, 1e-8, 4e-8].map(slope_at).to_vec();
+        for pair in slopes.windows(2) {
+            assert!((pair[0].0 / pair[1].0 - 1.0).abs() < 0.05, "{slopes:?}");
+        }
+        assert!(slopes.iter().all(|(_, largest)| *largest < 1e4), "{slopes:?}");
     }
 
     /// Both functions are the same to rounding on both sides of the end of their series, and their slope at zero is one half.

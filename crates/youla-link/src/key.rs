@@ -35,7 +35,7 @@ impl Key {
     /// Signs the frame in the front of a buffer; returns the number of bytes.
     ///
     /// # Errors
-    /// [`FrameError::Length`] where the buffer is too short; [`LARGEST_SIGNED`] bytes are enough.
+    /// [`FrameError::Length`] where the buffer is too short; [`crate::LARGEST_SIGNED`] bytes are enough.
     pub fn sign(&self, buffer: &mut [u8], length: usize) -> Result<usize, FrameError> {
         let too_long = FrameError::Length(length);
         let end = length.saturating_add(SIGNED.len());

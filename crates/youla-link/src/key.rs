@@ -6,14 +6,13 @@
 //! | 2 .. n - 32 | the [`Frame`] |
 //! | last 32 | authentication tag: HMAC-SHA-256 of the frame (RFC 2104) |
 //!
-//! A signature says who has made a frame, not when. A request that is sent again by a stranger is refused by its number, its host and its life; a
-//! reply by its number and host.
+//! A signature says who has made a frame, not when. A request that somebody else sends again is refused by its number, its host and its life; a
+//! reply by its number and host. What is not signed goes to [`crate::Station::receive_unsigned`], and its reply goes out unsigned.
 
 use crate::frame::{SIGNED, TAG, parts};
-use crate::{Frame, FrameError, Kind, LARGEST_FRAME, Outcome, Reply, is_stop};
+use crate::{Frame, FrameError, LARGEST_FRAME};
 use core::fmt;
 use hmac_sha256::HMAC;
-use youla_rt::Status;
 
 /// A key, as the state of HMAC that depends on it alone. It shows nothing of itself in `Debug`.
 #[derive(Clone)]
@@ -63,21 +62,4 @@ impl Key {
         own.update(content);
         own.finalize_verify(tag).then_some(frame).ok_or(FrameError::Key)
     }
-
-    /// Whether a machine with this key hands the bytes to [`crate::Station::receive`]: a request that is signed, or a stop of anybody.
-    #[must_use]
-    pub fn admits(&self, bytes: &[u8]) -> bool {
-        is_stop(bytes) || self.verify(bytes).is_ok()
-    }
-}
-
-/// The reply of a machine with a key to a request that it does not admit: [`Outcome::Key`], not signed. `None` for bytes that are no request.
-pub fn refuse_unsigned(bytes: &[u8], buffer: &mut [u8]) -> Option<usize> {
-    let asked = Frame::read(bytes).ok().filter(|frame| frame.kind == Kind::Request)?;
-    let reply =
-        Reply { request: asked.sequence, outcome: Outcome::Key, status: Status::from_bits(0), sample: 0, data: &[] };
-    let mut body = [0; 17];
-    let length = reply.write(&mut body)?;
-    let body = body.get(..length)?;
-    Frame { kind: Kind::Reply, schema: 0, sequence: 0, host: asked.host, life: 0, body }.write(buffer).ok()
 }

@@ -15,7 +15,7 @@
 //! | last 4 | CRC-32 (ISO-HDLC) of all bytes before |
 //!
 //! The machine counts the requests of each host apart, and executes a [`Request::Stop`] of any host always. With a [`Key`] that machine and hosts
-//! share, each frame is signed, and a machine executes nothing else of anybody without it.
+//! share, each frame is signed, and a machine executes nothing but a stop from anybody without it.
 //!
 //! All numbers are little-endian. The bodies are [`RowBlock`]s from the machine, [`Request`]s from the host, and a [`Reply`] to each
 //! request. [`Tracker`] finds what was lost, doubled or reordered on the way. [`Station`] is the machine's end: a
@@ -42,7 +42,7 @@ mod station;
 mod tracker;
 
 pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, LARGEST_SIGNED, VERSION};
-pub use key::{Key, refuse_unsigned};
+pub use key::Key;
 pub use old::{OLD_VERSION, write_old_describe};
 pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, Source};
 pub use rows::{RowBatch, RowBlock, RowShape, RowView};

@@ -125,12 +125,26 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         self.running.stop();
     }
 
-    /// Takes a frame of a host and writes the reply; `None` for a frame that is no request. A machine with a key asks [`crate::Key::admits`] before, and
-    /// signs what it sends: neither is computed here, so that both may wait for a moment without a sample.
+    /// Takes a frame of a host and writes the reply; `None` for a frame that is no request. A machine with a key asks [`crate::Key::verify`] before, and
+    /// signs the reply: neither is computed here, so that both may wait for a moment without a sample.
     ///
     /// # Errors
     /// [`FrameError`] of the frame, or of a buffer that is too short for the reply.
     pub fn receive(&mut self, bytes: &[u8], buffer: &mut [u8]) -> Result<Option<usize>, FrameError> {
+        self.take(bytes, true, buffer)
+    }
+
+    /// Takes a frame that [`crate::Key::verify`] refuses: a stop is executed, anything else is answered with [`Outcome::Key`]. It does not count
+    /// among the requests of its host: forged numbers would make those of the host late, or old ones new. The reply is not to be signed: with a
+    /// signature it could be presented to the host as the reply to another request of the same number.
+    ///
+    /// # Errors
+    /// As [`Station::receive`].
+    pub fn receive_unsigned(&mut self, bytes: &[u8], buffer: &mut [u8]) -> Result<Option<usize>, FrameError> {
+        self.take(bytes, false, buffer)
+    }
+
+    fn take(&mut self, bytes: &[u8], verified: bool, buffer: &mut [u8]) -> Result<Option<usize>, FrameError> {
         let frame = match Frame::read(bytes) {
             Err(refused @ FrameError::Version(_)) => return self.receive_old(bytes, buffer).ok_or(refused)?.map(Some),
             read => read?,
@@ -139,8 +153,15 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
             return Ok(None);
         }
         let request = Request::read(frame.body);
-        let outcome = self.outcome(&frame, request);
-        self.reply(&frame, outcome, request, buffer).map(Some)
+        let outcome = match request {
+            _ if verified => self.outcome(&frame, request),
+            Some(Request::Stop) => {
+                self.stop();
+                Outcome::Done
+            }
+            _ => Outcome::Key,
+        };
+        self.reply(&frame, outcome, request.filter(|_| verified), buffer).map(Some)
     }
 
     /// A host of version 1: its stop is executed, everything else is not known.

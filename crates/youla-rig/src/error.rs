@@ -60,7 +60,7 @@ pub enum Error {
     },
     /// Replies come without an authentication tag.
     #[error(
-        "the rig at {address} replies without the key: it has none; leave out \",key=FILE\", or give the rig this key"
+        "the rig at {address} replies without the key: it has none, or another one; leave out \",key=FILE\", or give the rig this key"
     )]
     Unsigned {
         /// Where it was asked.

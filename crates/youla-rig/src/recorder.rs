@@ -127,7 +127,7 @@ impl Recorder {
         std::mem::replace(&mut self.largest, zeros)
     }
 
-    /// Frames of other senders, which were told by their signatures.
+    /// Frames whose signature is missing or not that of the key.
     pub(crate) fn refuse(&mut self, frames: u64) {
         self.report.foreign += frames;
     }

@@ -6,7 +6,7 @@ use crate::way::received;
 use crate::{Error, Result};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
-use youla_link::{Key, LARGEST_SIGNED, Machine, Station, refuse_unsigned};
+use youla_link::{Key, LARGEST_SIGNED, Machine, Station};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices, Row};
 
 /// How a twin takes its time.
@@ -142,16 +142,17 @@ fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, 
     let Some((length, from)) = received(port.socket.recv_from(&mut bytes))? else { return Ok(false) };
     let mut reply = [0; LARGEST_SIGNED];
     let request = bytes.get(..length).unwrap_or_default();
-    if port.key.is_some_and(|key| !key.admits(request)) {
-        let refused = refuse_unsigned(request, &mut reply);
-        let unsigned = Port { key: None, ..port };
-        refused.into_iter().for_each(|length| unsigned.send(&mut reply, length, std::iter::once(from)));
-        return Ok(false);
+    let verified = port.key.is_none_or(|key| key.verify(request).is_ok());
+    let station = &mut twin.station;
+    let received =
+        if verified { station.receive(request, &mut reply) } else { station.receive_unsigned(request, &mut reply) };
+    let Ok(Some(length)) = received else { return Ok(false) };
+    let answering = Port { key: port.key.filter(|_| verified), ..port };
+    answering.send(&mut reply, length, std::iter::once(from));
+    if verified {
+        hosts.heard(from);
     }
-    let Ok(Some(length)) = twin.station.receive(request, &mut reply) else { return Ok(false) };
-    hosts.heard(from);
-    port.send(&mut reply, length, std::iter::once(from));
-    Ok(true)
+    Ok(verified)
 }
 
 /// One sample; whether a frame was complete.

@@ -20,10 +20,12 @@ use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 pub(crate) struct Slot {
     bytes: [u8; ROOM],
     length: usize,
+    /// Of a request: its signature is that of the key, or there is none; of a frame to the host: it is signed where there is a key.
+    pub(crate) signed: bool,
 }
 
 impl Slot {
-    pub(crate) const EMPTY: Slot = Slot { bytes: [0; ROOM], length: 0 };
+    pub(crate) const EMPTY: Slot = Slot { bytes: [0; ROOM], length: 0, signed: false };
 
     pub(crate) fn frame(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
@@ -82,11 +84,16 @@ impl Control {
     /// Rows if a frame of them is complete, else the reply to a request if there is one.
     fn exchange(&mut self) {
         let Some(slot) = self.frames.try_send() else { return };
+        slot.signed = true;
         let written = match self.rig.frame(&mut slot.bytes) {
             Some(written) => written.ok(),
             None => {
                 let Some(request) = self.requests.try_receive() else { return };
-                let written = self.rig.receive(request.frame(), &mut slot.bytes);
+                slot.signed = request.signed;
+                let written = match request.signed {
+                    true => self.rig.receive(request.frame(), &mut slot.bytes),
+                    false => self.rig.receive_unsigned(request.frame(), &mut slot.bytes),
+                };
                 self.requests.receive_done();
                 written.ok().flatten()
             }

@@ -113,19 +113,57 @@ fn a_machine_with_a_key_executes_nothing_of_a_stranger_but_a_stop() {
     ] {
         let plain = request(1, 5, asked);
         for forged in [plain.clone(), signed(&other, &plain)] {
-            assert!(!own.admits(&forged), "{asked:?}");
-            let mut reply = [0; LARGEST_FRAME];
-            let length = refuse_unsigned(&forged, &mut reply).unwrap();
+            assert!(own.verify(&forged).is_err(), "{asked:?}");
+            let (mut machine, mut reply) = (excited(), [0; LARGEST_FRAME]);
+            let books = machine.books();
+            let length = machine.receive_unsigned(&forged, &mut reply).unwrap().unwrap();
             let frame = Frame::read(&reply[..length]).unwrap();
             let read = Reply::read(frame.body).unwrap();
             assert_eq!((frame.host, read.request, read.outcome), (1, 5, Outcome::Key));
+            assert_eq!((machine.running().status().phase(), machine.books()), (Phase::Exciting, books));
             assert!(length <= forged.len() + 16, "an answer that is no means to flood somebody");
         }
-        assert!(own.admits(&signed(&own, &plain)));
+        assert!(own.verify(&signed(&own, &plain)).is_ok());
     }
     let stop = request(77, 5, Request::Stop);
-    assert!(own.admits(&stop) && own.admits(&signed(&other, &stop)) && is_stop(&signed(&own, &stop)));
-    assert_eq!(refuse_unsigned(b"YK", &mut [0; 64]), None);
+    for stop in [stop.clone(), signed(&other, &stop)] {
+        let (mut machine, mut reply) = (excited(), [0; LARGEST_FRAME]);
+        let length = machine.receive_unsigned(&stop, &mut reply).unwrap().unwrap();
+        assert_eq!(Reply::read(Frame::read(&reply[..length]).unwrap().body).unwrap().outcome, Outcome::Done);
+        assert_eq!(machine.running().status().phase(), Phase::Idle);
+    }
+    assert!(is_stop(&signed(&own, &stop)));
+    assert!(excited().receive_unsigned(b"YK", &mut [0; 64]).is_err());
+}
+
+/// Host 1 has armed and started.
+fn excited() -> Station<'static, 2, 2, 2, 2> {
+    let mut machine = station();
+    for (number, asked) in [(1, Request::Arm), (2, START)] {
+        let _ = machine.receive(&request(1, number, asked), &mut [0; LARGEST_FRAME]).unwrap();
+    }
+    machine
+}
+
+/// Stops without a signature that carry the number of a host and its sequence moved by half of the range twice: the old start of that host would be new again, or
+/// its next request late.
+#[test]
+fn forged_stops_move_no_numbers() {
+    let mut machine = excited();
+    let mut answer = [0; LARGEST_FRAME];
+    let books = machine.books();
+    let half = u32::MAX / 2;
+    for sequence in [2 + half, 2_u32.wrapping_add(2 * half), 0, u32::MAX] {
+        let _ = machine.receive_unsigned(&request(1, sequence, Request::Stop), &mut answer).unwrap();
+    }
+    assert_eq!((machine.running().status().phase(), machine.books()), (Phase::Idle, books));
+    for (number, asked) in [(1, Request::Arm), (2, START)] {
+        let _ = machine.receive(&request(1, number, asked), &mut answer).unwrap();
+        assert_eq!(machine.running().status().phase(), Phase::Idle, "{asked:?}");
+    }
+    let length = machine.receive(&request(1, 3, Request::BeginQ), &mut answer).unwrap().unwrap();
+    let reply = Reply::read(Frame::read(&answer[..length]).unwrap().body).unwrap();
+    assert_eq!(reply.outcome, Outcome::Done);
 }
 
 /// Whoever has heard every frame of a machine's life sends them again, in any order and at any time: no request is executed twice, though the machine keeps the

@@ -59,9 +59,7 @@ impl Rig {
     /// # Errors
     /// [`Error::Address`], [`Error::Key`], [`Error::Silent`], [`Error::Unsigned`], [`Error::Version`], [`Error::Description`].
     pub fn connect(address: &str) -> Result<Self> {
-        let mut rig = Self::open(address)?;
-        rig.describe()?;
-        Ok(rig)
+        Self::open(address)?.described()
     }
 
     /// Stops the excitation, whatever the machine is, then asks for the description. A machine with a key stops for a host without it too, but does
@@ -87,14 +85,12 @@ impl Rig {
         Ok(Rig { key, ..Self::unknown(Way::open(place)?, place) })
     }
 
-    #[cfg(all(unix, test))]
-    pub(crate) fn over(way: Way, address: &str) -> Result<Self> {
-        let mut rig = Self::unknown(way, address);
-        rig.describe()?;
-        Ok(rig)
+    pub(crate) fn described(mut self) -> Result<Self> {
+        self.describe()?;
+        Ok(self)
     }
 
-    fn unknown(way: Way, address: &str) -> Self {
+    pub(crate) fn unknown(way: Way, address: &str) -> Self {
         Rig {
             way,
             address: address.to_owned(),

@@ -38,7 +38,7 @@ fn rows_come_over_a_serial_line() {
     let over = Arc::new(AtomicBool::new(false));
     let end = over.clone();
     let thread = std::thread::spawn(move || serve(machine, &end));
-    let mut rig = Rig::over(Way::serial(host), "serial:test").unwrap();
+    let mut rig = Rig::unknown(Way::serial(host), "serial:test").described().unwrap();
     assert_eq!(rig.description().name, "rotor");
     let path = std::env::temp_dir().join(format!("youla-rig-serial-{}.csv", std::process::id()));
     let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();

@@ -51,11 +51,11 @@ pub(crate) fn growth(spectra: &Spectra, poles: &[c64]) -> f64 {
         let (x, angle) = (samples as f64 * p.norm().ln(), samples as f64 * p.arg());
         let slow = angle.abs() < SLOW;
         let (term, from): (fn(f64) -> f64, f64) = if slow { (beside_ramp, HELD) } else { (alone, 0.0) };
-        match spectra.held && x > from {
-            true if slow => term(x) - term(from) - 0.5 * curvature(term, x) * angle * angle,
-            true => term(x) - term(from),
-            false => 0.0,
+        if !spectra.held || x <= from {
+            return 0.0;
         }
+        let bend = if slow { 0.5 * curvature(term, x) * angle * angle } else { 0.0 };
+        term(x) - term(from) - bend
     };
     let of_record = |samples: usize| poles.iter().map(|p| of(p, samples)).sum::<f64>();
     spectra.records.iter().map(|lines| of_record(lines.samples)).sum()

@@ -32,19 +32,24 @@ const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
   domain: [["continuous", "s"], ["discrete", "z"]], hold: [["tustin", "Tustin"], ["zoh", "zero-order hold"]],
 });
 
-/** Fields of a form; a name with a point is that of a key in a table of its own. @param {string} form @param {any} of @param {(name: string, value: any) => void} changes @param {typeof FORMS} forms */
+/** Sets a key, or takes it away; a name with a point is that of a key in a table of its own. @param {any} of @param {string} path @param {any} value */
+function setKey(of, path, value) {
+  const [table, name] = path.includes(".") ? path.split(".") : ["", path], place = table ? of[table] ??= {} : of;
+  if (value === undefined) delete place[name]; else place[name] = value;
+}
+
+/** Fields of a form, named as for `setKey`. @param {string} form @param {any} of @param {(name: string, value: any) => void} changes @param {typeof FORMS} forms */
 function formFields(form, of, changes, forms = FORMS) {
   return forms[form].fields.filter(([name]) => name !== "hold" || of.domain === "continuous").map(([path, label, kind, unit]) => {
     const [table, name] = path.includes(".") ? path.split(".") : ["", path], values = table ? of[table] ?? {} : of;
-    const changed = (/** @type {string} */ key, /** @type {any} */ value) => table ? changes(table, { ...values, [key]: value }) : changes(key, value);
-    if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
-    if (/^(number|gain|count)/.test(kind)) return numberField({ label, unit, name, optional: !["number", "gain"].includes(kind), several: kind.startsWith("gain"), value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
+    if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changes(path, value) });
+    if (/^(number|gain|count)/.test(kind)) return numberField({ label, unit, name, optional: !["number", "gain"].includes(kind), several: kind.startsWith("gain"), value: values[name], changed: value => changes(path, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
     const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;
       try { read = kind === "json" || input.value.includes("[") ? JSON.parse(input.value) : numbersOf(input.value); } catch { read = null; }
       complain(input, read == null && (kind === "json" ? "A matrix by rows, such as [[1, 0], [0, 1]]" : "Numbers with commas between them, such as 1, -0.5"));
-      if (read != null) changed(name, read);
+      if (read != null) changes(path, read);
     });
     return element("label", { class: "field" }, element("span", {}, label), input);
   });
@@ -73,10 +78,10 @@ const controllerPart = (() => {
     }
     if (FORMS[form]?.fields.length) parts.push(element("div", { class: "fields" }, ...formFields(form, values, (name, value) => settings.change(table => {
       const of = Object.values(table.controller)[0];
-      if (value === undefined) delete of[name]; else of[name] = value;
+      setKey(of, name, value);
       if (name === "domain") value === "discrete" ? delete of.hold : of.hold ??= "tustin";
     }))));
-    place.replaceChildren(...parts);
+    refill(place, ...parts);
     drawing.innerHTML = loopDrawing(form === "open_loop" ? null : values.feedback ?? "unknown", !!form);
   }
 
@@ -99,9 +104,9 @@ const controllerPart = (() => {
   settings.listen(({ nominal }) => {
     const form = nominal ? Object.keys(nominal)[0] : "", options = /** @type {[string, string][]} */ ([["", "none"], ...Object.entries(NOMINAL).map(([key, f]) => [key, f.name])]);
     if (form && !NOMINAL[form]) options.push([form, "as in run.toml"]);
-    place.replaceChildren(choiceField({ label: "Nominal model, for comparison", value: form, options, changed: chosen => settings.change(table => {
+    refill(place, choiceField({ label: "Nominal model, for comparison", value: form, options, changed: chosen => settings.change(table => {
       if (chosen) table.nominal = { [chosen]: structuredClone(NOMINAL[chosen].start) }; else delete table.nominal;
-    }) }), ...(NOMINAL[form] ? formFields(form, nominal[form], (name, value) => settings.change(table => { table.nominal[form][name] = value; }), NOMINAL) : []));
+    }) }), ...(NOMINAL[form] ? formFields(form, nominal[form], (name, value) => settings.change(table => { setKey(table.nominal[form], name, value); }), NOMINAL) : []));
   });
 })();
 

@@ -25,10 +25,10 @@ const gains = (() => {
 
   function fields() {
     const form = Object.keys(edited)[0], values = edited[form];
-    const changed = (name, value) => { if (value === undefined) delete values[name]; else values[name] = value; ask(); };
+    const changed = (name, value) => { setKey(values, name, value); ask(); };
     const loops = name => [values[name]].flat().keys(), sliders = ["kp", "ki", "kd", "ti", "td"].filter(name => values[name] !== undefined)
       .flatMap(name => [...loops(name)].filter(k => [values[name]].flat()[k] > 0).map(k => slider(name, k, values, changed)));
-    place.replaceChildren(...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && /^(number|gain)/.test(f[2]))) fields(); }) : [])),
+    refill(place, ...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && /^(number|gain)/.test(f[2]))) setTimeout(fields); }) : [])),
       element("div", { class: "fields" }, element("button", { type: "button", class: "action", onclick: () => { edited = structuredClone(ran); fields(); ask(); } }, "Back to the controller that ran"),
         element("button", { type: "button", class: "action", onclick: () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))) }, "Save these gains")));
   }

@@ -110,7 +110,7 @@ const log = (() => {
   }
 
   function drawn() {
-    const path = file(), found = path ? shown(path) : { columns: [] };
+    const { data } = settings.table, path = file(), found = path ? shown(path) : { columns: [] };
     const rows = found.columns.map(column => {
       const role = roleOf(column.name), select = element("select", { "aria-label": `Role of ${column.name}`, disabled: column.problem ? "" : null },
         ...ROLES.map(([key, name]) => element("option", { value: key, selected: key === role ? "" : null }, name)));
@@ -121,12 +121,11 @@ const log = (() => {
           element("td", {}, column.low === column.high ? "constant" : column.step ? `even steps of ${readOut(column.step)}` : "")]));
     });
     const head = ["Column", "Role", "Lowest", "Highest", "Unit", ""].map((text, k) => element("th", { class: k === 2 || k === 3 ? "number" : null, scope: "col" }, text));
-    place.replaceChildren(...(rows.length ? [element("div", { class: "scroll" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)))] : []));
-    if (!rows.length) return;
-    const needed = settings.table.data.time_column ? null : numberField({ label: "Sample time", unit: "s", value: settings.table.data.sample_time, changed: value => settings.change(({ data }) => { data.sample_time = value; }) });
-    const { data } = settings.table;
-    place.append(element("div", { class: "fields" }, needed, choiceField({ label: "Take out of every channel", value: data.detrend ?? "mean", options: [["mean", "the mean"], ["linear", "a straight line"], ["none", "nothing"]],
-      changed: value => settings.change(t => { t.data.detrend = value; }) })));
+    if (!rows.length) return place.replaceChildren();
+    const needed = data.time_column ? null : numberField({ label: "Sample time", unit: "s", value: data.sample_time, changed: value => settings.change(t => { t.data.sample_time = value; }) });
+    refill(place, element("div", { class: "scroll" }, element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows))),
+      element("div", { class: "fields" }, needed, choiceField({ label: "Take out of every channel", value: data.detrend ?? "mean", options: [["mean", "the mean"], ["linear", "a straight line"], ["none", "nothing"]],
+        changed: value => settings.change(t => { t.data.detrend = value; }) })));
   }
 
   /** Surveys the files that the settings name, as after a saved page was opened. */

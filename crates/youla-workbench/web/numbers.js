@@ -39,6 +39,21 @@ function numberField({ label, value, unit, changed, optional, name, several }) {
   return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
 }
 
+/** Puts new fields in place of those there; the focus, and text that is being typed, stay at the field of the same name.
+ * @param {HTMLElement} place @param {any[]} parts */
+function refill(place, ...parts) {
+  const name = (/** @type {any} */ node) => [node.tagName, node.type === "radio" ? node.value : "", node.getAttribute("aria-label") ?? node.closest("label")?.textContent ?? node.textContent].join();
+  const active = /** @type {any} */ (place.contains(document.activeElement) ? document.activeElement : null), typed = active?.type === "text" && active.value !== active.defaultValue;
+  place.replaceChildren(...parts.filter(part => part != null));
+  const next = active && /** @type {any} */ ([...place.querySelectorAll("input, select, textarea, button")].find(node => name(node) === name(active)));
+  next?.focus({ preventScroll: true });
+  if (!next || !typed) return;
+  next.value = active.value;
+  next.setSelectionRange(active.selectionStart, active.selectionEnd);
+  // A browser tells of no change that it has not seen being typed.
+  next.addEventListener("blur", () => next.dispatchEvent(new Event("change")), { once: true });
+}
+
 /** A choice. @param {{ label: string, value: string, options: [string, string][], changed: (value: string) => void }} of */
 function choiceField({ label, value, options, changed }) {
   const select = element("select", { "aria-label": label }, ...options.map(([key, name]) => element("option", { value: key, selected: key === value ? "" : null }, name)));

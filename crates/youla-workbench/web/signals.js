@@ -110,15 +110,16 @@ const signals = (() => {
     overFrequency(place, "Coherence with the known excitation", answer.curves, c => c.coherence, { range: () => [0, 1.02] });
   }
 
-  // The check runs again after each change, once nothing has changed for a moment.
+  // The check runs again after each change, once nothing has changed for a moment; what was asked for before the last change is not shown.
   function check() {
     clearTimeout(checking);
-    checking = window.setTimeout(async () => {
+    const timer = checking = window.setTimeout(async () => {
       const { data, controller } = settings.table;
       if (!data.inputs.length || !data.outputs.length || !log.sampleTime()) return told([], null);
       // What can be said before a controller is described is said: as of an open loop, without the tests of the controller.
       const table = controller ? settings.text : null, asked = table ?? (await engine.ask({ verb: "toml", table: { ...settings.table, controller: openLoop(data) } })).toml;
-      const answer = await engine.ask({ verb: "check", toml: asked });
+      const answer = timer === checking ? await engine.ask({ verb: "check", toml: asked }) : null;
+      if (timer !== checking) return;
       // A sign that is missing is asked for where it is chosen.
       if (answer.error?.includes("feedback")) return told([], { sentence: answer.error.replace(/^run\.toml[:\d]*: |\.$/g, "") });
       if (answer.error) return told([{ severity: "defect", sentence: answer.error }], null);

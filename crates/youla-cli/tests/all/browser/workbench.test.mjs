@@ -246,6 +246,29 @@ test("files that are no logs, a wrong sign, a run that is cancelled", async () =
   await close();
 });
 
+test("what is typed while the page computes stays, and so does the focus", async () => {
+  const { page, complaints, close } = await opened();
+  await page.setInputFiles("#open-file", csv("axis.csv", axis({ samples: 3000 })));
+  await page.waitForSelector("#traces canvas");
+  // Answers come late, as those for a long log do, and each redraws the fields while the next is typed.
+  await page.evaluate(() => { const ask = engine.ask; engine.ask = async (...all) => { await new Promise(done => setTimeout(done, 150)); return ask(...all); }; });
+  const fields = page.locator("#controller .fields input"), toml = () => page.inputValue("#toml");
+  for (const [form, values] of [["pid", { kp: "0,4", ki: "6", kd: "0.002", tf: "0.0001" }], ["cascade", { "Position kp": "12", "Velocity kp": "0.5", "Velocity ki": "3", "Filter of": "0.0002" }]]) {
+    await page.selectOption("#controller select >> nth=0", form);
+    await page.waitForSelector(`#controller .fields label:has-text("${Object.keys(values)[0]}")`);
+    await fields.first().focus();
+    for (const value of Object.values(values)) { await page.keyboard.type(value, { delay: 40 }); await page.keyboard.press("Tab"); }
+    const last = values.tf ? /derivative_filter = 0.0001/ : /velocity_filter = 0.0002/;
+    for (let k = 0; k < 100 && !last.test(await toml()); k++) await new Promise(done => setTimeout(done, 50));
+    for (const [k, value] of Object.values(values).entries()) assert.equal(await fields.nth(k).inputValue(), value.replace(",", "."));
+    assert.equal(await page.evaluate(() => document.activeElement.closest("label").textContent), await page.locator("#controller .fields label").nth(4).textContent());
+  }
+  const { position, velocity } = await page.evaluate(() => settings.table.controller.cascade);
+  assert.deepEqual([position, velocity], [{ kp: 12 }, { kp: 0.5, ki: 3 }]);
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
 test("in the frame of a notebook", async () => {
   const text = readFileSync(csv("axis.csv", axis({ samples: 3000 })), "utf8");
   // A document of its own, whose policy lets the frame run.

@@ -49,6 +49,8 @@ enum Imperfection {
     Offset,
     /// White noise at the input of the plant, a fifth of the excitation.
     InputNoise,
+    /// The same size with a pole of 0.99.
+    SlowTorque,
     /// No excitation.
     Quiet,
     /// The stated controller has twice the gain.
@@ -73,7 +75,7 @@ const fn family(name: &'static str, kind: Kind, imperfection: Imperfection, samp
     Family { name, kind, imperfection, samples, honest }
 }
 
-pub(crate) const FAMILIES: [Family; 19] = [
+pub(crate) const FAMILIES: [Family; 20] = [
     family("modes", Kind::Modes, Imperfection::Nothing, 9000),
     family("drive", Kind::Drive, Imperfection::Nothing, 9000),
     family("levitation", Kind::Levitation, Imperfection::Nothing, 9000),
@@ -89,6 +91,7 @@ pub(crate) const FAMILIES: [Family; 19] = [
     family("gain that drifts by 5 %", Kind::Modes, Imperfection::GainDrift, 9000),
     family("offsets", Kind::Modes, Imperfection::Offset, 9000),
     family("noise at the input", Kind::Modes, Imperfection::InputNoise, 9000),
+    family("slow torque of a drive", Kind::Drive, Imperfection::SlowTorque, 9000),
     family("five modes at a fiftieth of the rate", Kind::Slow, Imperfection::Nothing, 60_000),
     family("no excitation", Kind::Modes, Imperfection::Quiet, 9000),
     family("wrong controller", Kind::Modes, Imperfection::WrongController, 9000),
@@ -283,6 +286,9 @@ impl Loop {
             xk = k.a() * &xk + k.b() * &seen;
             if imperfection == Imperfection::LoadSteps && rng.random_range(0..800) == 0 {
                 load = 0.6 * (rng.random::<f64>() - 0.5);
+            }
+            if imperfection == Imperfection::SlowTorque {
+                load = 0.99 * load + 0.2 * (1.0f64 - 0.99 * 0.99).sqrt() * rng.sample::<f64, _>(StandardNormal);
             }
             let drift = 0.05 * (t as f64 / self.samples as f64 - 0.5);
             let mut acting = Mat::<f64>::zeros(m, 1);

@@ -2,6 +2,7 @@
 //! Stewart, Commun. ACM 15 (1972), 820; G. Kitagawa, Int. J. Control 25 (1977), 745. They are Sylvester equations
 //! whose two coefficients share one real Schur form.
 
+use crate::linalg::eigen::schur::RealSchur;
 use crate::linalg::sylvester::{Form, solve_on_schur_forms, solve_symmetric};
 use crate::linalg::{check_finite, check_shape, real_schur};
 use crate::{Error, Result};
@@ -84,6 +85,14 @@ fn solve(domain: Domain, a: MatRef<'_, f64>, q: MatRef<'_, f64>) -> Result<Lyapu
     })?;
     let residual = residual(domain, a, x.as_ref(), q);
     Ok(Lyapunov { x, residual })
+}
+
+/// X of `A X A' - X + Q = 0` for a symmetric Q, with the Schur form of A.
+///
+/// # Errors
+/// [`Error::Singular`] where two eigenvalues of A have the product 1.
+pub(crate) fn discrete_lyapunov_on(schur: &RealSchur, q: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    solve_symmetric("X", Form::Product, schur, (-q).as_ref())
 }
 
 /// Relative residual, zero where all terms are.

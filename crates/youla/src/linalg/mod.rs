@@ -34,6 +34,7 @@ pub use least_squares::{LeastSquares, least_squares};
 pub(crate) use levenberg::LEAST_DAMPING;
 pub use levenberg::{Damping, Trial, damped_step, decrease};
 pub(crate) use logm::logm;
+pub(crate) use lyapunov::discrete_lyapunov_on;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use sequential_qr::SequentialQr;

@@ -124,7 +124,13 @@ impl<'a> Beside<'a> {
             .collect();
         let values: Vec<Vec<c64>> = records.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
         let chart = Chart::new(model, found.feedthrough);
-        let extra = Extra { count: shapes.len() * spectra.inputs + 1, values: &values, quick: false };
+        let extra = Extra {
+            count: shapes.len() * spectra.inputs + 1,
+            values: &values,
+            quick: false,
+            held: true,
+            coefficients: false,
+        };
         let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
         let explained = energy(spectra, &clean, &found.noise).max(TINY);
         Beside { spectra, model, shapes, records, explained, factor, lengths }

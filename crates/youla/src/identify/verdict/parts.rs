@@ -85,7 +85,11 @@ impl Part {
             Information::ByOutput(normal.with_slope(slope).reduced())
         } else {
             let factor = linearise(lines, &point, &chart, &found.noise).factor;
-            Information::Dense(with_slope_of_growth(factor, &spectra, &point.model, &chart))
+            // A filter that moves with the poles has no growth beside the squares.
+            Information::Dense(match found.noise.enters_at_inputs() {
+                true => factor,
+                false => with_slope_of_growth(factor, &spectra, &point.model, &chart),
+            })
         };
         let energy = energy(&spectra, &point.residuals(&spectra), &found.noise);
         Some(Part { information, energy, samples: (spectra.samples() * spectra.outputs) as f64 })

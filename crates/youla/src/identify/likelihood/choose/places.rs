@@ -7,12 +7,12 @@
 //! a step at tau takes off -2 log likelihood (the generalised likelihood ratio of Willsky and Jones, IEEE Transactions on Automatic Control
 //! 21 (1976), 108), for all tau at once by Fourier transforms.
 
-use super::problem::Choice;
+use super::problem::{Choice, NOISE_ORDER};
 use crate::identify::likelihood::data::lanes::LANES;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::rows::{Place, Rows};
-use crate::identify::likelihood::search::with_best_ends;
+use crate::identify::likelihood::search::{deviance, with_best_ends};
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, c64};
 use rustfft::FftPlanner;
@@ -60,6 +60,9 @@ impl<'a> Places<'a> {
         let lines = spectra.records.first()?;
         let (m, p, noise) = (spectra.inputs, spectra.outputs, &choice.found.noise);
         let point = with_best_ends(spectra, choice.found.point.model.clone(), noise);
+        // Few large steps have a colour as well, of which they would be what is expected.
+        let plain = noise.has_a_colour().then(|| deviance(spectra, &point, (NOISE_ORDER, false)).1);
+        let noise = plain.as_ref().unwrap_or(noise);
         let model = &point.model;
         let unit = 1.0 / (lines.samples as f64).sqrt();
         let begins = |k: usize, kind: usize, i: usize, response: &[c64]| match kind.checked_sub(m) {
@@ -73,7 +76,16 @@ impl<'a> Places<'a> {
         let signals: Vec<c64> = (0..lines.z.len()).flat_map(signals).collect();
         let chart = Chart::new(model, choice.found.feedthrough);
         let of_model = model.end_count() + chart.parameters();
-        let place = Place { lines, t: &point.ends[0], model, chart: &chart, noise, more: (&signals, m + p) };
+        let place = Place {
+            lines,
+            t: &point.ends[0],
+            model,
+            chart: &chart,
+            noise,
+            entering: &[],
+            coefficients: false,
+            more: (&signals, m + p),
+        };
         let columns = whitened(place, of_model + m + p + 1);
         let kind = |column: &Column| Kind { left: vec![square(column); lines.samples], column: column.clone() };
         let kinds: Vec<Kind> = columns[of_model..of_model + m + p].iter().map(kind).collect();

@@ -100,9 +100,10 @@ impl Problem<'_> {
     }
 
     /// The calmest model beside the best, searched to its end, with its rivals.
-    pub(super) fn concluded(&self, tried: Vec<Choice>, at: &Choice) -> Option<Solution> {
+    pub(super) fn concluded(&self, mut tried: Vec<Choice>, at: &Choice) -> Option<Solution> {
         let samples = self.samples().0;
-        let mut chosen = calmest(&tried, at)?.clone();
+        let place = calmest(&tried, at)?;
+        let mut chosen = tried[place].clone();
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
         let options = SearchOptions { filter_moves: true, ..last.options(40, 0.01, &chosen.delays) };
@@ -110,6 +111,8 @@ impl Problem<'_> {
             let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
             if last.stabilised() || !chosen.stabilised() {
                 chosen = last;
+                // Beside the others it counts by what it had with a filter as theirs.
+                tried[place].found = chosen.found.clone();
             }
         }
         let least = tried.iter().map(|c| c.as_rival(samples)).fold(f64::INFINITY, f64::min);
@@ -261,11 +264,12 @@ impl Problem<'_> {
     }
 }
 
-/// Of those of the same order within [`INDISTINCT`] of the least criterion the one with the least gain at high frequencies, where
-/// physical machines have little and wrong dead times much.
-fn calmest<'a>(tried: &'a [Choice], at: &Choice) -> Option<&'a Choice> {
+/// The place of the model with the least gain at high frequencies, where physical machines have little and wrong dead times much, of those of
+/// the same order within [`INDISTINCT`] of the least criterion.
+fn calmest(tried: &[Choice], at: &Choice) -> Option<usize> {
     let calm = |c: &Choice| c.found.point.model.fast_gain();
     let same = |c: &Choice| c.order() == at.order() && c.found.feedthrough == at.found.feedthrough;
-    let alike = |c: &&Choice| c.criterion <= at.criterion + INDISTINCT && same(c);
-    tried.iter().filter(alike).min_by(|a, b| calm(a).total_cmp(&calm(b)))
+    let alike = |(_, c): &(usize, &Choice)| c.criterion <= at.criterion + INDISTINCT && same(c);
+    let calmest = tried.iter().enumerate().filter(alike).min_by(|(_, a), (_, b)| calm(a).total_cmp(&calm(b)));
+    calmest.map(|(place, _)| place)
 }

@@ -6,6 +6,7 @@
 
 use crate::identify::likelihood::recommendation::Predictor;
 use crate::identify::likelihood::search::autoregression::Regression;
+use crate::identify::likelihood::search::driven::Driven;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::linalg::{RiccatiProblem, block, block_diagonal, dare, eigenvalues};
 use crate::lti::{Discrete, StateSpace};
@@ -22,26 +23,36 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
     let mirrored = |i: usize| noise.regression[i].driven.as_ref().map_or(1.0, |driven| driven.unstable);
     let size = |i: usize| sizes[i] * mirrored(i);
     let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * size(i) * size(j));
-    // Noise at the inputs moves the states of the plant; of several outputs each has its own, independent of the others.
+    // Noise at the inputs moves the states of the plant; of several outputs each has its own, independent of the others. A colour has a state
+    // for each input.
     let driven = || noise.regression.iter().enumerate().filter_map(|(i, r)| Some((i, r.driven.as_deref()?)));
-    let copies: usize = if p > 1 { driven().map(|(_, d)| d.gain.len()).sum() } else { 0 };
+    let own = |d: &Driven| d.of_colour.len() + if p > 1 { d.gain.len() } else { 0 };
+    let copies: usize = driven().map(|(_, d)| own(d)).sum();
     let first = n + copies;
     let mut a = block_diagonal(block_diagonal(plant.a(), Mat::zeros(copies, copies).as_ref()).as_ref(), shift.as_ref());
     let b = block(&[&[plant.b()], &[Mat::zeros(copies + extra, plant.inputs()).as_ref()]]);
     let mut c = block(&[&[plant.c(), Mat::zeros(p, copies).as_ref(), seen.as_ref()]]);
     let mut gain = block(&[&[Mat::zeros(first, p).as_ref()], &[enters.as_ref()]]);
-    let mut at = if p > 1 { n } else { 0 };
+    let mut at = n;
     for (i, driven) in driven() {
         let states = driven.gain.len();
+        let of_plant = if p > 1 { at } else { 0 };
         if p > 1 {
             a.submatrix_mut(at, at, states, states).copy_from(&driven.a);
             (0..states).for_each(|s| c[(i, at + s)] = driven.c[(0, s)] * sizes[i]);
+            at += states;
         }
-        for (s, k) in driven.gain.iter().enumerate() {
-            gain[(at + s, i)] = k / sizes[i];
-            (0..extra).for_each(|j| a[(at + s, first + j)] = k / sizes[i] * seen[(i, j)]);
+        let mut driven_by = |s: usize, k: f64| {
+            gain[(s, i)] = k / sizes[i];
+            (0..extra).for_each(|j| a[(s, first + j)] = k / sizes[i] * seen[(i, j)]);
+        };
+        driven.gain.iter().enumerate().for_each(|(s, k)| driven_by(of_plant + s, *k));
+        driven.of_colour.iter().enumerate().for_each(|(j, k)| driven_by(at + j, *k));
+        for (j, _) in driven.of_colour.iter().enumerate() {
+            a[(at + j, at + j)] = driven.entry.colour.unwrap_or(0.0);
+            (0..states).for_each(|s| a[(of_plant + s, at + j)] = driven.b[(s, j)]);
         }
-        at += states;
+        at += driven.of_colour.len();
     }
     // The zero matrix solves the Riccati equation; it is the stabilising solution where the zeros of the noise are inside of the unit circle
     // without it.

@@ -8,7 +8,7 @@ use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::by_output::{Arrow, Ends, Normal, inverse};
 use crate::identify::likelihood::search::chart::{Chart, Places};
-use crate::identify::likelihood::search::linearise::{Extra, compressed, linearise_with};
+use crate::identify::likelihood::search::linearise::{Extra, has_columns, linearise_with, without_last};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
@@ -45,9 +45,13 @@ impl Root {
     /// Of a point of records, with what else was estimated from them.
     pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise, nuisance: &Nuisance) -> Self {
         if chart.units.is_empty() {
-            let extra = Extra { count: nuisance.count, values: &nuisance.values, quick: false };
+            // In a loop the coefficients of the noise are not independent of those of the plant.
+            let coefficients = has_columns(noise);
+            let extra =
+                Extra { count: nuisance.count, values: &nuisance.values, quick: false, held: false, coefficients };
+            let count = nuisance.count + if coefficients { noise.parameters() } else { 0 };
             let factor = linearise_with(spectra, point, chart, noise, &extra).factor;
-            return Root::dense(inverse_root(&without_last(factor, nuisance.count), chart.parameters()));
+            return Root::dense(inverse_root(&without_last(factor, count), chart.parameters()));
         }
         let normal = Normal::new(spectra, point, chart, noise, Ends::Shared).reduced();
         Root::of_arrow(&normal.factor(0.0), chart, &point.model)
@@ -118,18 +122,6 @@ impl Root {
         let own = slopes.own.iter().zip(&self.own).map(|(slopes, root)| product(slopes, root));
         (own.collect(), shared)
     }
-}
-
-/// The factor `[J N r]` without its columns N, their coefficients free: that of `[N J r]` below and behind N.
-fn without_last(factor: Mat<f64>, count: usize) -> Mat<f64> {
-    let kept = factor.ncols().saturating_sub(count + 1);
-    if count == 0 {
-        return factor;
-    }
-    let moved = count + kept;
-    let place = |j: usize| if j < moved { (j + kept) % moved } else { j };
-    let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
-    factor.submatrix(count, count, factor.nrows().saturating_sub(count), kept + 1).to_owned()
 }
 
 /// A product of a complex matrix and a real one: its real parts above its imaginary parts.

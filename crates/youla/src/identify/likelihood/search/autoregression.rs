@@ -22,7 +22,9 @@ pub(crate) struct Regression {
 impl Regression {
     /// Number of its coefficients.
     pub(crate) fn parameters(&self) -> usize {
-        self.coefficients.len() + usize::from(self.zero != 0.0) + usize::from(self.driven.is_some())
+        self.coefficients.len()
+            + usize::from(self.zero != 0.0)
+            + self.driven.as_ref().map_or(0, |driven| driven.parameters())
     }
 
     /// `(1 + a_1 / z + ...) / (1 - b / z) / H`, given `1 / z`.

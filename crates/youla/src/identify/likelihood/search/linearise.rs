@@ -8,6 +8,9 @@
 //! Helmersson and Ribarits, Automatica 40 (2004), 1629). The columns of t are eliminated record by record.
 
 use super::chart::Chart;
+use super::driven::entering::Entering;
+use super::driven::longest;
+use super::model::Model;
 use super::noise::Noise;
 use super::point::Point;
 use super::rows::{Place, Rows};
@@ -38,16 +41,35 @@ pub(crate) struct Extra<'a> {
     pub(crate) values: &'a [Vec<c64>],
     /// Whether normal equations suffice; orthogonal triangles otherwise.
     pub(crate) quick: bool,
+    /// Whether the filter of the noise is held: it is not that of the model.
+    pub(crate) held: bool,
+    /// Whether the coefficients of the noise have columns, behind those of the parameters.
+    pub(crate) coefficients: bool,
 }
 
 /// The triangular factor of all records at a point.
 pub(crate) fn linearise(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Linearised {
-    linearise_with(spectra, point, chart, noise, &Extra { count: 0, values: &[], quick: false })
+    linearise_with(
+        spectra,
+        point,
+        chart,
+        noise,
+        &Extra { count: 0, values: &[], quick: false, held: false, coefficients: false },
+    )
 }
 
 /// The same by normal equations, for a step of a search.
-pub(crate) fn linearise_quickly(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Linearised {
-    linearise_with(spectra, point, chart, noise, &Extra { count: 0, values: &[], quick: true })
+pub(crate) fn linearise_quickly(
+    spectra: &Spectra,
+    point: &Point,
+    (chart, noise): (&Chart, &Noise),
+    held: bool,
+) -> Linearised {
+    let coefficients = !held && has_columns(noise);
+    let extra = Extra { count: 0, values: &[], quick: true, held, coefficients };
+    let Linearised { factor, ends } = linearise_with(spectra, point, chart, noise, &extra);
+    let count = if coefficients { noise.parameters() } else { 0 };
+    Linearised { factor: without_last(factor, count), ends }
 }
 
 /// The same with further columns behind those of the parameters.
@@ -58,13 +80,24 @@ pub(crate) fn linearise_with(
     noise: &Noise,
     extra: &Extra<'_>,
 ) -> Linearised {
-    let (n, parameters) = (point.model.end_count(), chart.parameters() + extra.count);
+    let of_noise = if extra.coefficients { noise.parameters() } else { 0 };
+    let (n, parameters) = (point.model.end_count(), chart.parameters() + of_noise + extra.count);
     let width = parameters + 1;
     let mut factor = Mat::<f64>::zeros(0, width);
     let mut ends = Vec::with_capacity(spectra.records.len());
+    let entering = if extra.held { Vec::new() } else { entering(spectra, &point.model, chart, noise) };
     for (k, (lines, t)) in spectra.records.iter().zip(&point.ends).enumerate() {
         let values = extra.values.get(k).map_or(&[][..], Vec::as_slice);
-        let place = Place { lines, t, model: &point.model, chart, noise, more: (values, extra.count) };
+        let place = Place {
+            lines,
+            t,
+            model: &point.model,
+            chart,
+            noise,
+            entering: &entering,
+            coefficients: extra.coefficients,
+            more: (values, extra.count),
+        };
         let r = triangle(place, extra.quick);
         ends.push(r.submatrix(0, 0, n.min(r.nrows()), n + width).to_owned());
         let below = r.nrows().saturating_sub(n);
@@ -72,6 +105,35 @@ pub(crate) fn linearise_with(
         factor = if factor.nrows() == 0 { rest.to_owned() } else { compressed(&stacked(&factor, &rest.to_owned())) };
     }
     Linearised { factor, ends }
+}
+
+/// Noise at the inputs of each output, in the coordinates of a model; `None` where none enters.
+fn entering(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> Vec<Option<Entering>> {
+    let of = |output: usize| {
+        let entry = noise.regression[output].driven.as_ref()?.entry;
+        Entering::new((model, longest(spectra)), chart, (output, entry))
+    };
+    (0..model.outputs).map(of).collect()
+}
+
+/// Coefficients of the noise of all outputs that have columns at most: the work grows with the square of their number.
+const MOST_COEFFICIENTS: usize = 100;
+
+/// Whether the coefficients of a noise have columns.
+pub(crate) fn has_columns(noise: &Noise) -> bool {
+    (1..=MOST_COEFFICIENTS).contains(&noise.parameters())
+}
+
+/// The factor `[J N r]` without its columns N, their coefficients free: that of `[N J r]` below and behind N.
+pub(crate) fn without_last(factor: Mat<f64>, count: usize) -> Mat<f64> {
+    let kept = factor.ncols().saturating_sub(count + 1);
+    if count == 0 {
+        return factor;
+    }
+    let moved = count + kept;
+    let place = |j: usize| if j < moved { (j + kept) % moved } else { j };
+    let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
+    factor.submatrix(count, count, factor.nrows().saturating_sub(count), kept + 1).to_owned()
 }
 
 pub(crate) fn stacked(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
@@ -94,7 +156,8 @@ fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
 }
 
 fn columns(place: &Place<'_>) -> usize {
-    place.model.end_count() + place.chart.parameters() + place.more.1 + 1
+    let of_noise = if place.coefficients { place.noise.parameters() } else { 0 };
+    place.model.end_count() + place.chart.parameters() + of_noise + place.more.1 + 1
 }
 
 /// Lines whose rows are brought to triangular form together.

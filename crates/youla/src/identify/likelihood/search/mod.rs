@@ -115,7 +115,7 @@ fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
 }
 
 /// -2 log likelihood and noise of a point.
-pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
+pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: (usize, bool)) -> (f64, Noise) {
     let residuals = point.residuals(spectra);
     let noise = Noise::fit(spectra, &residuals, noise_order, &point.model);
     (of_noise(spectra, &noise, &point.model), noise)
@@ -129,14 +129,14 @@ fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
 pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
     let chart = Chart::inputs_only(&model, feedthrough);
     let point = Point::at_rest(model, spectra.records.len());
-    Slopes::new(spectra, &point, (&chart, noise), Vec::new()).trial(&point, LEAST_DAMPING).0
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), true).trial(&point, LEAST_DAMPING).0
 }
 
 /// The ends of the records by least squares, the model kept.
 pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> Point {
     let chart = Chart::fixed(&model);
     let point = Point::at_rest(model, spectra.records.len());
-    Slopes::new(spectra, &point, (&chart, noise), Vec::new()).trial(&point, 0.0).0
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), true).trial(&point, 0.0).0
 }
 
 /// Searches from a start, on many lines first on groups of them; `None` where nothing finite comes of it.
@@ -178,7 +178,8 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
 
 /// What a search makes small, and the noise of the point.
 fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
-    let (value, noise) = deviance(spectra, point, options.noise_order);
+    let (value, noise) =
+        deviance(spectra, point, (options.noise_order, options.filter_moves && !separable(spectra.outputs)));
     (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
 }
 
@@ -196,12 +197,13 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
     while steps < options.steps {
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
-        let mut slope = slope(spectra, &point.model, &chart, options);
-        if filter_moves {
+        let moves = filter_moves && noise.enters_at_inputs();
+        let mut slope = slope(spectra, &point.model, &chart, (options, moves && !separable(spectra.outputs)));
+        if moves && separable(spectra.outputs) {
             let of_noise = driven_slope::slope(spectra, &point, &chart, &noise);
             slope.iter_mut().zip(of_noise).for_each(|(slope, of_noise)| *slope += of_noise);
         }
-        let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope);
+        let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope, !moves);
         let lower = damping.descend(|damping| {
             let (trial, promised) = slopes.trial(&point, damping);
             // A promise that is not a number ends the search as well.
@@ -251,12 +253,12 @@ enum Slopes<'a> {
 
 impl<'a> Slopes<'a> {
     /// With the slope of what is no square.
-    fn new(spectra: &Spectra, point: &Point, (chart, noise): (&'a Chart, &Noise), slope: Vec<f64>) -> Self {
+    fn new(spectra: &Spectra, point: &Point, (chart, noise): (&'a Chart, &Noise), slope: Vec<f64>, held: bool) -> Self {
         if separable(spectra.outputs) {
             let normal = Normal::new(spectra, point, chart, noise, Ends::Shared);
             return Slopes::ByOutput(chart, if slope.is_empty() { normal } else { normal.with_slope(slope) });
         }
-        let Linearised { factor, ends } = linearise_quickly(spectra, point, chart, noise);
+        let Linearised { factor, ends } = linearise_quickly(spectra, point, (chart, noise), held);
         Slopes::Dense(chart, Linearised { factor: with_slope(factor, &slope), ends })
     }
 
@@ -309,7 +311,7 @@ fn moved(point: &Point, chart: &Chart, determined: &[Mat<f64>], step: &[f64]) ->
     let (states, n) = (point.model.order(), point.model.end_count());
     let mut ends = point.ends.clone();
     for (end, rows) in ends.iter_mut().zip(determined) {
-        let last = n + step.len();
+        let last = rows.ncols() - 1;
         let mut change = vec![0.0; n];
         for i in (0..n.min(rows.nrows())).rev() {
             let mut value = rows[(i, last)];
@@ -339,8 +341,9 @@ pub(crate) fn damped(factor: &Mat<f64>, parameters: usize, damping: f64) -> (Vec
 }
 
 /// Slopes of the terms of half the deviance that are no squares.
-fn slope(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
-    let mut out = unstable::slope(unstable::outside, spectra, model, chart);
+fn slope(spectra: &Spectra, model: &Model, chart: &Chart, (options, moves): (&SearchOptions, bool)) -> Vec<f64> {
+    let mut out =
+        if moves { vec![0.0; chart.parameters()] } else { unstable::slope(unstable::outside, spectra, model, chart) };
     if chart.feedthrough {
         let slopes = feedthrough::slopes(model, &options.direct);
         let first = out.len() - slopes.len();

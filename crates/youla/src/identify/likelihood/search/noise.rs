@@ -46,7 +46,12 @@ impl Noise {
     }
 
     /// From the residuals of a model, lines x p per record.
-    pub(crate) fn fit(spectra: &Spectra, residuals: &[Vec<c64>], largest_order: usize, model: &Model) -> Self {
+    pub(crate) fn fit(
+        spectra: &Spectra,
+        residuals: &[Vec<c64>],
+        (largest_order, coloured): (usize, bool),
+        model: &Model,
+    ) -> Self {
         let p = spectra.outputs;
         let (samples, log) = (spectra.samples(), (spectra.samples().max(2) as f64).ln());
         let behind =
@@ -59,7 +64,7 @@ impl Noise {
             // The size of noise at the inputs first as if white noise were left, then with the autoregression that is.
             let (mut best, mut least, mut known) = (None, least - log, Regression::default());
             for _ in 0..SIZES {
-                let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known)) else { break };
+                let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known), coloured) else { break };
                 let rest = driven.rest(spectra, &own);
                 let (noise, criterion) = behind(&rest);
                 if criterion >= least {
@@ -75,24 +80,42 @@ impl Noise {
         };
         let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise { regression, ..Noise::white(p) };
+        noise.cover_rest(spectra, &rest);
+        noise
+    }
+
+    /// Covariance of what the noise leaves of its rest behind what the plant makes of noise at its inputs, by output and record.
+    fn cover_rest(&mut self, spectra: &Spectra, rest: &[Vec<Vec<c64>>]) {
+        let p = spectra.outputs;
         let mut sum = Mat::<f64>::zeros(p, p);
         for (k, lines) in spectra.records.iter().enumerate() {
             let rest: Vec<&[c64]> = rest.iter().map(|rest| rest[k].as_slice()).collect();
-            let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, rest: &rest, range });
+            let of = |range| Arch::new().dispatch(Products { noise: self, lines, rest: &rest, range });
             parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
         }
-        let samples = samples.max(1) as f64;
+        let samples = spectra.samples().max(1) as f64;
         for i in 0..p {
             for j in 0..=i {
                 let value = sum[(i, j)] / samples + if i == j { ROUNDING * ROUNDING } else { 0.0 };
                 (sum[(i, j)], sum[(j, i)]) = (value, value);
             }
         }
-        noise.set_covariance(sum);
+        self.set_covariance(sum);
         if separable(p) {
-            noise.set_independent();
+            self.set_independent();
         }
-        noise
+    }
+
+    /// The same of residuals, lines x p per record, for coefficients that are known.
+    #[cfg(test)]
+    pub(crate) fn cover(&mut self, spectra: &Spectra, residuals: &[Vec<c64>]) {
+        let of = |(i, regression): (usize, &Regression)| {
+            let own: Vec<Vec<c64>> =
+                residuals.iter().map(|v| v.iter().skip(i).step_by(spectra.outputs).copied().collect()).collect();
+            regression.driven.as_ref().map_or(own.clone(), |driven| driven.rest(spectra, &own))
+        };
+        let rest: Vec<Vec<Vec<c64>>> = self.regression.iter().enumerate().map(of).collect();
+        self.cover_rest(spectra, &rest);
     }
 
     /// Counts the innovations of the outputs as independent.
@@ -137,6 +160,11 @@ impl Noise {
     /// Whether the plant shapes it at an output.
     pub(crate) fn enters_at_inputs(&self) -> bool {
         self.regression.iter().any(|regression| regression.driven.is_some())
+    }
+
+    /// Whether noise at the inputs has a colour.
+    pub(crate) fn has_a_colour(&self) -> bool {
+        self.regression.iter().any(|r| r.driven.as_ref().is_some_and(|driven| driven.entry.colour.is_some()))
     }
 
     /// Number of its coefficients.

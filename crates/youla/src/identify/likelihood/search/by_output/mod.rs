@@ -87,7 +87,13 @@ pub(crate) struct Normal {
 impl Normal {
     /// At a point, in the coordinates of [`Chart::by_outputs`] or of a part of them.
     pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise, ends: Ends) -> Self {
-        Normal::with(spectra, point, chart, noise, (ends, &Extra { count: 0, values: &[], quick: true }))
+        Normal::with(
+            spectra,
+            point,
+            chart,
+            noise,
+            (ends, &Extra { count: 0, values: &[], quick: true, held: true, coefficients: false }),
+        )
     }
 
     /// The same with further shared columns.

@@ -1,7 +1,10 @@
 //! The rows of the slopes and of the residual that a group of lines gives, whitened.
 
+mod noise;
+
 use super::block::Block;
 use super::chart::Chart;
+use super::driven::entering::Entering;
 use super::model::Model;
 use super::noise::Noise;
 use super::state_lanes::states;
@@ -19,6 +22,10 @@ pub(crate) struct Place<'a> {
     pub(crate) model: &'a Model,
     pub(crate) chart: &'a Chart,
     pub(crate) noise: &'a Noise,
+    /// Noise at the inputs of each output, whose filter moves with the parameters; none where all filters are held.
+    pub(crate) entering: &'a [Option<Entering>],
+    /// Whether the coefficients of the noise have columns, behind those of the parameters.
+    pub(crate) coefficients: bool,
     /// Further columns, lines x p x count, and their count.
     pub(crate) more: (&'a [c64], usize),
 }
@@ -33,6 +40,13 @@ pub(crate) struct Rows {
     left: Vec<Lanes>,
     full: Vec<Lanes>,
     filters: Vec<Lanes>,
+    /// Of each output `epsilon`, and w of each input.
+    innovations: Vec<Lanes>,
+    entered: Vec<Lanes>,
+    /// X with them of one block.
+    filtered: Vec<Lanes>,
+    /// L of all states of each output.
+    all_left: Vec<Lanes>,
 }
 
 /// One group of lines, computed with the widest instructions that the processor has.
@@ -64,6 +78,10 @@ impl Rows {
             left: zeros(p * s),
             full: zeros(s * (s + m)),
             filters: zeros(p),
+            innovations: zeros(p),
+            entered: zeros(p * m),
+            filtered: zeros(s),
+            all_left: zeros(p * model.order()),
         }
     }
 
@@ -90,15 +108,22 @@ impl Rows {
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
+        if place.entering.iter().any(Option::is_some) {
+            self.innovations(place, (&z, &ends, &u));
+        }
         let (mut state, mut column) = (0, model.end_count());
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
             self.states(block, (&z, &ends, &u), &place.t[state..state + block.states]);
-            self.slopes(block, directions, (&ends, &u), [state, column]);
+            self.slopes(block, directions, (&ends, &u), [state, column], place.entering);
             state += block.states;
             column += directions.ncols();
         }
         self.drift((&z, &ends), &place.t[state..], state);
         self.direct(place, &u, column);
+        self.gains(place, &z, model.end_count());
+        if place.coefficients {
+            self.coefficients(place, &z, model.end_count() + chart.parameters());
+        }
         let (more, count) = place.more;
         for o in 0..p {
             for e in 0..count {
@@ -125,17 +150,35 @@ impl Rows {
 
     /// The columns of t and of the directions of one block, and its share of the residual.
     #[inline(always)]
-    fn slopes(&mut self, block: &Block, directions: &Mat<f64>, (ends, u): (&Lanes, &[Lanes]), at: [usize; 2]) {
+    fn slopes(
+        &mut self,
+        block: &Block,
+        directions: &Mat<f64>,
+        (ends, u): (&Lanes, &[Lanes]),
+        at: [usize; 2],
+        entering: &[Option<Entering>],
+    ) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
         let entries = s * (s + m);
+        let states_of_model = self.all_left.len() / self.filters.len();
         for o in 0..block.c.len() / s {
+            let entering = entering.get(o).and_then(Option::as_ref);
+            self.filtered(block, at[0], (o, entering));
+            let entered = entering.filter(|entering| entering.sees(at[0])).is_some();
+            self.all_left[o * states_of_model + at[0]..][..s].copy_from_slice(&self.left[o * s..][..s]);
             for i in 0..s {
                 let left = &self.left[o * s + i];
                 self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
                 self.values[o * columns + at[0] + i].set_product(left, ends);
                 if directions.ncols() > 0 {
-                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &self.x[j]));
-                    (0..m).for_each(|j| self.full[s * s + i * m + j].set_product(left, &u[j]));
+                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &self.filtered[j]));
+                    for j in 0..m {
+                        let mut drive = u[j];
+                        if entered {
+                            drive.add_scaled(&self.entered[o * m + j], 1.0);
+                        }
+                        self.full[s * s + i * m + j].set_product(left, &drive);
+                    }
                 }
             }
             for q in 0..directions.ncols() {
@@ -143,7 +186,7 @@ impl Rows {
                 let sum = &mut self.values[o * columns + at[1] + q];
                 *sum = Lanes::ZERO;
                 (0..entries).for_each(|e| sum.add_scaled(&self.full[e], direction[e]));
-                (0..s).for_each(|j| sum.add_scaled(&self.x[j], direction[entries + o * s + j]));
+                (0..s).for_each(|j| sum.add_scaled(&self.filtered[j], direction[entries + o * s + j]));
             }
         }
     }

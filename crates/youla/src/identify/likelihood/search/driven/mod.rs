@@ -1,0 +1,230 @@
+//! Noise at an output that enters at the inputs of the plant: torque of cogging and of a current controller, load, turbulence.
+//!
+//! ```text
+//! spectrum of v_i = sigma^2 (1 + lambda |G_i|^2) = sigma^2 |H_i|^2,     H_i = 1 + C_i (z I - A)^-1 K_i
+//! ```
+//! with white noise of equal size at all inputs beside that of the sensor. It has the resonances of the plant as peaks, which an autoregression
+//! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
+//! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
+//!
+//! Torque that changes slowly has a colour, `w = e / (z - c)`: one state for each input behind white noise. An autoregression of the whole would
+//! take dozens of coefficients for it, and in a loop a wrong plant takes fewer.
+
+pub(crate) mod entering;
+mod gains;
+mod size;
+
+use super::autoregression::Regression;
+pub(crate) use gains::{Gains, NARROW, has_line, is_line, longest};
+
+use super::model::Model;
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
+use crate::linalg::{RiccatiProblem, block, dare, eigenvalues};
+use faer::{Mat, Scale, c64};
+use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Growth of a pole over all records up to which an integrator is not told from it, as a logarithm. Noise of several outputs has a state for each,
+/// of which nothing may grow beside those of the plant.
+const GROWTH: f64 = 2.0;
+
+/// The filter `1 / H_i` of an output, and what it is made of.
+#[derive(Debug, Clone)]
+pub(crate) struct Driven {
+    /// Quadratics of the numerator and denominator: `(1 + c_1 / z + c_2 / z^2) / (1 + d_1 / z + d_2 / z^2)`.
+    sections: Vec<[f64; 4]>,
+    /// Those of the numerator with the poles outside of the unit circle where they are.
+    over: Vec<[f64; 2]>,
+    /// Size and colour.
+    pub(crate) entry: Entry,
+    /// Product of the magnitudes of the poles outside of the unit circle, which the filter mirrors: `1 / H_i` over its size.
+    pub(crate) unstable: f64,
+    /// K_i, one for each state of the model, zero for those that the output does not see.
+    pub(crate) gain: Vec<f64>,
+    /// The same of the colour, one for each input; none of white noise.
+    pub(crate) of_colour: Vec<f64>,
+    /// Covariance of the states that the output sees and of the colours before a sample is known, over that of the sensor's noise.
+    covariance: Mat<f64>,
+    /// A of the model.
+    pub(crate) a: Mat<f64>,
+    /// B of the model, zero for states that the output does not see.
+    pub(crate) b: Mat<f64>,
+    /// C of the model, its row of the output.
+    pub(crate) c: Mat<f64>,
+}
+
+/// Size of noise at the inputs, and its pole where it has a colour.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    /// lambda.
+    pub(crate) ratio: f64,
+    /// c.
+    pub(crate) colour: Option<f64>,
+}
+
+/// What white noise drives: the plant, behind one state for each input where the noise has a colour.
+struct System {
+    a: Mat<f64>,
+    b: Mat<f64>,
+    /// Of one output.
+    c: Mat<f64>,
+}
+
+impl System {
+    fn new(plant: &Model, output: usize, colour: Option<f64>) -> Self {
+        let (a, b, c) = plant.matrices();
+        let c = c.subrows(output, 1).to_owned();
+        let Some(pole) = colour else { return System { a, b, c } };
+        let (n, m) = (a.nrows(), b.ncols());
+        let colours = Mat::<f64>::identity(m, m);
+        System {
+            a: block(&[&[a.as_ref(), b.as_ref()], &[Mat::zeros(m, n).as_ref(), (&colours * pole).as_ref()]]),
+            b: block(&[&[Mat::zeros(n, m).as_ref()], &[colours.as_ref()]]),
+            c: block(&[&[c.as_ref(), Mat::zeros(1, m).as_ref()]]),
+        }
+    }
+}
+
+impl Driven {
+    /// The most likely size of such noise in the residual of an output, on the lines of each record, with an autoregression behind it; `None` where
+    /// there is none.
+    pub(crate) fn new(
+        model: &Model,
+        (spectra, gains): (&Spectra, &Gains),
+        residual: &[Vec<c64>],
+        (output, behind): (usize, &Regression),
+        coloured: bool,
+    ) -> Option<Self> {
+        let samples = spectra.samples() as f64;
+        let poles = model.poles();
+        let grows = || poles.iter().any(|p| p.norm().ln() > GROWTH / samples);
+        if poles.is_empty() || spectra.outputs > 1 && grows() {
+            return None;
+        }
+        let entry = size::entry((spectra, gains), residual, (output, behind), coloured)?;
+        Driven::of_entry(model, &gains.hidden[output], (output, entry))
+    }
+
+    /// Noise of a known size and colour at the inputs, without the blocks that are hidden from the output.
+    pub(crate) fn of_entry(model: &Model, hidden: &[usize], (output, entry): (usize, Entry)) -> Option<Self> {
+        let plant = model.without(hidden);
+        let System { a, b, c } = System::new(&plant, output, entry.colour);
+        let q = &b * b.transpose() * Scale(entry.ratio);
+        let one = Mat::<f64>::identity(1, 1);
+        let dual = RiccatiProblem { a: a.transpose(), b: c.transpose(), q: q.as_ref(), r: one.as_ref(), s: None };
+        let solution = dare("the noise", &dual).ok()?;
+        let k = solution.gain.transpose().to_owned();
+        let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
+        let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
+        let unstable = plant.poles().iter().map(|p| p.norm().max(1.0)).product();
+        let colours = entry.colour.map_or(Vec::new(), |pole| vec![c64::new(pole, 0.0); model.inputs]);
+        let poles = [plant.poles(), colours].concat();
+        let [inside, over, under] = [poles.iter().copied().map(mirrored).collect(), poles, zeros].map(quadratics);
+        let sections = inside.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
+        let (a, mut b, c) = model.matrices();
+        let (mut gain, mut states, mut at) = (vec![0.0; a.nrows()], 0..0, 0);
+        for (place, block) in model.blocks.iter().enumerate() {
+            states = states.end..states.end + block.states;
+            for state in states.clone() {
+                if hidden.contains(&place) {
+                    b.row_mut(state).fill(0.0);
+                } else {
+                    gain[state] = k[(at, 0)];
+                    at += 1;
+                }
+            }
+        }
+        let of_colour = (at..k.nrows()).map(|j| k[(j, 0)]).collect();
+        let c = c.subrows(output, 1).to_owned();
+        Some(Driven { sections, over, entry, unstable, gain, of_colour, covariance: solution.x, a, b, c })
+    }
+
+    /// Number of its parameters.
+    pub(crate) fn parameters(&self) -> usize {
+        1 + usize::from(self.entry.colour.is_some())
+    }
+
+    /// Multiplies by `1 / H_i`, poles outside of the unit circle mirrored, given `1 / z`.
+    #[inline(always)]
+    pub(crate) fn apply(&self, back: &Lanes, to: &mut Lanes) {
+        self.apply_sections(self.sections.iter().map(|[c1, c2, ..]| [*c1, *c2]), back, to);
+    }
+
+    /// The same with the poles where they are.
+    #[inline(always)]
+    pub(super) fn apply_unmirrored(&self, back: &Lanes, to: &mut Lanes) {
+        self.apply_sections(self.over.iter().copied(), back, to);
+    }
+
+    #[inline(always)]
+    fn apply_sections(&self, over: impl Iterator<Item = [f64; 2]>, back: &Lanes, to: &mut Lanes) {
+        let mut under = Lanes::ZERO;
+        under.re.fill(1.0);
+        for (over, [_, _, d1, d2]) in over.zip(&self.sections) {
+            multiply(to, back, over);
+            multiply(&mut under, back, [*d1, *d2]);
+        }
+        to.multiply(&under.inverse());
+    }
+
+    /// The residual of the output behind `1 / H_i`, on the lines of each record.
+    pub(crate) fn rest(&self, spectra: &Spectra, residual: &[Vec<c64>]) -> Vec<Vec<c64>> {
+        let of_record = |(lines, v): (&Lines, &Vec<c64>)| {
+            let of = |range| Arch::new().dispatch(Rest { driven: self, lines, v, range });
+            parts(lines.z.len()).map(of).collect::<Vec<Vec<c64>>>().concat()
+        };
+        spectra.records.iter().zip(residual).map(of_record).collect()
+    }
+
+    /// The same at one line.
+    pub(crate) fn at(&self, back: c64) -> c64 {
+        let quadratic = |one: f64, two: f64| (back * two + one) * back + 1.0;
+        self.sections.iter().fold(c64::ONE, |f, [c1, c2, d1, d2]| f * quadratic(*c1, *c2) / quadratic(*d1, *d2))
+    }
+}
+
+/// Multiplies by `1 + a / z + b / z^2`.
+#[inline(always)]
+fn multiply(to: &mut Lanes, back: &Lanes, [a, b]: [f64; 2]) {
+    for l in 0..LANES {
+        let (x, y) = (back.re[l], back.im[l]);
+        let (re, im) = (1.0 + a * x + b * (x * x - y * y), (a + 2.0 * b * x) * y);
+        (to.re[l], to.im[l]) = (to.re[l] * re - to.im[l] * im, to.re[l] * im + to.im[l] * re);
+    }
+}
+
+/// Residuals behind `1 / H_i` on a part of the lines, with the widest instructions that the processor has.
+struct Rest<'a> {
+    driven: &'a Driven,
+    lines: &'a Lines,
+    v: &'a [c64],
+    range: Range<usize>,
+}
+
+impl NullaryFnOnce for Rest<'_> {
+    type Output = Vec<c64>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<c64> {
+        let Rest { driven, lines, v, range } = self;
+        let mut out = Vec::with_capacity(range.len());
+        for first in range.clone().step_by(LANES) {
+            let line = |l: usize| (first + l).min(range.end - 1);
+            let back = Lanes::gather(|l| lines.z[line(l)].conj());
+            let mut rest = Lanes::gather(|l| v[line(l)]);
+            driven.apply(&back, &mut rest);
+            out.extend((0..LANES.min(range.end - first)).map(|l| c64::new(rest.re[l], rest.im[l])));
+        }
+        out
+    }
+}
+
+/// `1 + a / z + b / z^2` of each conjugate pair, and of real roots two by two.
+fn quadratics(roots: Vec<c64>) -> Vec<[f64; 2]> {
+    let pairs = roots.iter().filter(|r| r.im > 0.0).map(|r| [-2.0 * r.re, r.norm_sqr()]);
+    let real: Vec<f64> = roots.iter().filter(|r| r.im == 0.0).map(|r| r.re).collect();
+    let product = |two: &[f64]| two.get(1).map_or([-two[0], 0.0], |b| [-two[0] - b, two[0] * b]);
+    pairs.chain(real.chunks(2).map(product)).collect()
+}

@@ -224,14 +224,20 @@ impl Equation<'_> {
     }
 }
 
-/// Samples, counted from 0, in which all channels repeat the sample before; none where the outputs repeat themselves by their steps, and
-/// before they first move.
+/// Samples, counted from 0, in which all channels repeat the sample before; none before the outputs first move, and where these repeat themselves
+/// by their steps or because they are held: then the other channels repeat beside some of them by chance.
 pub(super) fn repeated(groups: &[MatRef<'_, f64>], y: MatRef<'_, f64>) -> Vec<usize> {
     let same = |x: MatRef<'_, f64>, k: usize| (0..x.ncols()).all(|j| x[(k, j)] == x[(k - 1, j)]);
     let moves = (1..y.nrows()).find(|k| !same(y, *k)).unwrap_or(y.nrows());
     let rows: Vec<usize> = (moves..y.nrows()).filter(|k| groups.iter().all(|x| same(*x, *k))).collect();
-    if rows.is_empty() || rows.len() > PLACES || (0..y.ncols()).any(|j| in_steps(y, j)) { Vec::new() } else { rows }
+    let held = || (moves..y.nrows()).filter(|k| same(y, *k)).count() >= HELD_ROWS * rows.len();
+    let by_chance = rows.is_empty() || rows.len() > PLACES || held() || (0..y.ncols()).any(|j| in_steps(y, j));
+    if by_chance { Vec::new() } else { rows }
 }
+
+/// Samples in which the outputs repeat, for each row in which all channels do, from which the outputs are held.
+/// Chosen: the repeated rows of a log repeat its outputs once each.
+const HELD_ROWS: usize = 3;
 
 /// Whether the smallest differences between successive samples are equal to each other: then some are zero by chance.
 fn in_steps(y: MatRef<'_, f64>, j: usize) -> bool {
@@ -276,4 +282,22 @@ pub(super) fn jump(record: &str, row: usize, by: f64, channel: &Channel) -> Find
                   zeroing, and without a time column whether a row is missing there";
     let finding = Finding::new(Test::Drift, Severity::Defect, record, what).channel(&channel.name);
     finding.rows(row, row).number("jump", by).advice(advice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row that a log has twice is found; where a sensor delivers every second sample, an input that is held for five repeats beside it.
+    #[test]
+    fn rows_of_held_sensors_repeat_by_chance() {
+        let moving = |t: usize| (0.37 * t as f64).sin();
+        let log = |at: &dyn Fn(usize) -> [f64; 2]| Mat::from_fn(400, 2, |t, j| at(t)[j]);
+        let place = |t: usize| if t < 200 { t } else { t - 1 };
+        let place = |t: usize| if t < 200 { t } else { t - 1 };
+        let twice = log(&|t| [moving(3 * place(t)), moving(place(t))]);
+        assert_eq!(repeated(&[twice.as_ref()], twice.subcols(1, 1)), [200]);
+        let held = log(&|t| [moving(t / 5 * 5), moving(t / 2 * 2)]);
+        assert!(repeated(&[held.as_ref()], held.subcols(1, 1)).is_empty());
+    }
 }

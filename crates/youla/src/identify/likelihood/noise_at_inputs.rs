@@ -269,6 +269,37 @@ fn stated_deviations_hold_under_slow_torque_in_a_loop() {
     assert!((0.6..1.4).contains(&ratio) && held >= 78, "{ratio} {held}");
 }
 
+/// `H(z)` of the predictor is one over the filter of noise at the inputs with a colour, of each output by itself.
+#[test]
+fn the_predictor_has_the_filter_of_noise_with_a_colour() {
+    let plant = machine(0.97);
+    for outputs in [1, 2] {
+        let c = Mat::from_fn(outputs, 3, |i, j| [[1.0, 0.5, 0.2], [0.3, 0.0, 1.0]][i][j]);
+        let model = Model::of(plant.a(), plant.b(), c.as_ref(), vec![0.0; outputs]).unwrap();
+        let mut noise = Noise::white(outputs);
+        for output in 0..outputs {
+            let entry = driven::Entry { ratio: 0.7 + output as f64, colour: Some(0.9) };
+            noise.regression[output].coefficients = vec![-0.5, 0.1];
+            noise.regression[output].driven = driven::Driven::of_entry(&model, &[], (output, entry)).map(Into::into);
+        }
+        let (a, b, c) = model.matrices();
+        let own = StateSpace::new(a, b, c, Mat::zeros(outputs, 1), plant.time()).unwrap();
+        let stated = predictor(&own, &noise, &vec![1.0; outputs]);
+        let one = Mat::identity(outputs, outputs);
+        let h = StateSpace::new(stated.a, stated.k.unwrap(), stated.c, one, plant.time()).unwrap();
+        for share in [0.001, 0.02, 0.0207, 0.1, 0.4] {
+            let omega = std::f64::consts::TAU * share;
+            let mut filters = vec![c64::ZERO; outputs];
+            noise.filters(c64::cis(omega), &mut filters);
+            let response = frequency_response(&h, &[omega / plant.time().ts()]).unwrap().at(0).to_owned();
+            for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
+                let expected = if i == j { c64::ONE } else { c64::ZERO };
+                assert!((response[(i, j)] * filters[j] - expected).norm() < 1e-6, "{outputs} {share} {i} {j}");
+            }
+        }
+    }
+}
+
 /// After steps of a search, which form the blocks of the model anew, `H(z)` of the predictor is one over the filter of the noise.
 #[test]
 fn the_predictor_after_a_search_has_the_filter_of_its_noise() {

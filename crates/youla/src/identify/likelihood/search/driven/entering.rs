@@ -20,6 +20,7 @@
 use super::gains::hidden;
 use super::{Driven, Entry, System};
 use crate::identify::likelihood::data::lanes::Lanes;
+use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
 use crate::linalg::{RealSchur, discrete_lyapunov_on, real_schur};
@@ -70,6 +71,30 @@ impl Filter {
         Change { a: of(&self.system.a), b: of(&self.system.b), c: of(&self.system.c) }
     }
 
+    /// What moves with the entries of a block, whose states begin at `at` of the filter. Colours, whose states begin at the given place, drive the
+    /// plant through its B, white noise drives it by itself.
+    fn along(
+        &self,
+        (block, at): (&Block, usize),
+        output: usize,
+        colours: Option<usize>,
+        moved: impl Fn(usize) -> f64,
+    ) -> Change {
+        let (s, m) = (block.states, block.b.len() / block.states);
+        let mut change = self.unchanged();
+        for i in 0..s {
+            (0..s).for_each(|j| change.a[(at + i, at + j)] = moved(i * s + j));
+            for j in 0..m {
+                match colours {
+                    Some(first) => change.a[(at + i, first + j)] = moved(s * s + i * m + j),
+                    None => change.b[(at + i, j)] = moved(s * s + i * m + j),
+                }
+            }
+            change.c[(0, at + i)] = moved(s * (s + m) + output * s + i);
+        }
+        change
+    }
+
     /// dK along a change and along a change of lambda.
     fn slope(&self, change: &Change, of_ratio: f64) -> Option<Mat<f64>> {
         let (p, closed, c) = (&self.covariance, &self.closed, &self.system.c);
@@ -84,11 +109,7 @@ impl Filter {
 
 impl Entering {
     /// In the coordinates of a model; `longest` is the number of samples of the longest record.
-    pub(in crate::identify::likelihood::search) fn new(
-        (model, longest): (&Model, f64),
-        chart: &Chart,
-        (output, entry): (usize, Entry),
-    ) -> Option<Self> {
+    pub(crate) fn new((model, longest): (&Model, f64), chart: &Chart, (output, entry): (usize, Entry)) -> Option<Self> {
         let hidden = hidden(model, longest, output);
         let driven = Driven::of_entry(model, &hidden, (output, entry))?;
         let (m, n) = (model.inputs, model.order());
@@ -108,28 +129,18 @@ impl Entering {
             places.iter().enumerate().for_each(|(i, place)| to[(*place, column)] = dk[(i, 0)]);
             Some(())
         };
+        let colours = entry.colour.map(|_| of_plant);
         let (mut column, mut at) = (0, 0);
         for (k, block) in model.blocks.iter().enumerate() {
-            let (s, count) = (block.states, chart.parameters_of(k));
             if !hidden.contains(&k) {
-                for q in 0..count {
+                for q in 0..chart.parameters_of(k) {
                     let moved = |entry: usize| chart.direction(k, entry, q);
-                    let mut change = filter.unchanged();
-                    for i in 0..s {
-                        (0..s).for_each(|j| change.a[(at + i, at + j)] = moved(i * s + j));
-                        for j in 0..m {
-                            // The colours drive the plant through its B, white noise by itself.
-                            let to = if entry.colour.is_some() { &mut change.a } else { &mut change.b };
-                            let offset = if entry.colour.is_some() { of_plant } else { 0 };
-                            to[(at + i, offset + j)] = moved(s * s + i * m + j);
-                        }
-                        change.c[(0, at + i)] = moved(s * (s + m) + output * s + i);
-                    }
+                    let change = filter.along((block, at), output, colours, moved);
                     put(&mut slopes, column + q, &change, 0.0)?;
                 }
-                at += s;
+                at += block.states;
             }
-            column += count;
+            column += chart.parameters_of(k);
         }
         let mut by_entry = Mat::<f64>::zeros(n + m, 2);
         put(&mut by_entry, 0, &filter.unchanged(), 1.0)?;
@@ -143,44 +154,44 @@ impl Entering {
 
     /// `epsilon`, the residual behind `1 / H`.
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn innovation(&self, residual: &Lanes, back: &Lanes) -> Lanes {
+    pub(crate) fn innovation(&self, residual: &Lanes, back: &Lanes) -> Lanes {
         let mut rest = *residual;
         self.driven.apply_unmirrored(back, &mut rest);
         rest
     }
 
     /// Pole of the colour.
-    pub(in crate::identify::likelihood::search) fn colour(&self) -> Option<f64> {
+    pub(crate) fn colour(&self) -> Option<f64> {
         self.driven.entry.colour
     }
 
     /// K_w of an input.
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn of_colour(&self, input: usize) -> f64 {
+    pub(crate) fn of_colour(&self, input: usize) -> f64 {
         self.driven.of_colour[input]
     }
 
     /// K of a state.
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn gain(&self, state: usize) -> f64 {
+    pub(crate) fn gain(&self, state: usize) -> f64 {
         self.driven.gain[state]
     }
 
     /// Whether the output sees a state.
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn sees(&self, state: usize) -> bool {
+    pub(crate) fn sees(&self, state: usize) -> bool {
         self.seen[state]
     }
 
     /// dK of a state along the parameters, or along lambda and the pole of the colour.
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn slope(&self, state: usize, parameter: usize) -> f64 {
+    pub(crate) fn slope(&self, state: usize, parameter: usize) -> f64 {
         self.slopes[(state, parameter)]
     }
 
     /// dK of a state along lambda (0) and along the pole of the colour (1).
     #[inline(always)]
-    pub(in crate::identify::likelihood::search) fn by_entry(&self, state: usize, which: usize) -> f64 {
+    pub(crate) fn by_entry(&self, state: usize, which: usize) -> f64 {
         self.by_entry[(state, which)]
     }
 }

@@ -294,7 +294,6 @@ mod tests {
         let moving = |t: usize| (0.37 * t as f64).sin();
         let log = |at: &dyn Fn(usize) -> [f64; 2]| Mat::from_fn(400, 2, |t, j| at(t)[j]);
         let place = |t: usize| if t < 200 { t } else { t - 1 };
-        let place = |t: usize| if t < 200 { t } else { t - 1 };
         let twice = log(&|t| [moving(3 * place(t)), moving(place(t))]);
         assert_eq!(repeated(&[twice.as_ref()], twice.subcols(1, 1)), [200]);
         let held = log(&|t| [moving(t / 5 * 5), moving(t / 2 * 2)]);

@@ -56,7 +56,7 @@ pub use finding::{Finding, Severity, Test, by_severity};
 pub use flatline::{Standstill, held, stuck};
 pub use noise::{Noise, noise};
 pub use options::CheckOptions;
-pub use outliers::{Outliers, outliers};
+pub use outliers::{Outliers, outliers, output_outliers};
 pub use quantisation::{Quantisation, quantisation};
 pub use record::{ChannelNames, LoggedRecord, check_record};
 pub use timing::{Gap, TimingCheck, timing};

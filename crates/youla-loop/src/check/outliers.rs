@@ -20,6 +20,7 @@ use super::patterns::Search;
 use super::regression::Lagged;
 use super::sequence::jump;
 use crate::error::Result;
+use youla::MatRef;
 use youla::signal::Channel;
 
 /// The wrong samples of one output.
@@ -56,6 +57,19 @@ pub fn outliers(values: &[f64], options: &CheckOptions) -> Result<Outliers> {
     match Lagged::new(&[signal], options.lags) {
         Some(lagged) => Ok(of_outputs(&lagged, 0, 1, options)?.remove(0).0),
         None => Ok(Outliers::default()),
+    }
+}
+
+/// Wrong samples of each output of a record by the past of its inputs and outputs, as [`super::check_record`] finds them.
+///
+/// # Errors
+/// [`youla::Error::NoConvergence`] of the regression.
+pub fn output_outliers(u: MatRef<'_, f64>, y: MatRef<'_, f64>, options: &CheckOptions) -> Result<Vec<Outliers>> {
+    match Lagged::new(&[u, y], options.lags) {
+        Some(lagged) => {
+            Ok(of_outputs(&lagged, u.ncols(), y.ncols(), options)?.into_iter().map(|(found, _)| found).collect())
+        }
+        None => Ok(vec![Outliers::default(); y.ncols()]),
     }
 }
 

@@ -22,7 +22,7 @@ use youla_loop::redesign::{Redesign, RedesignOptions};
 pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Recommendation> {
     settings.check()?;
     let declared = declared_loop(settings, records, folder)?;
-    recommend(RunContext { settings, records, declared: &declared, factorisation: None })
+    recommend(RunContext { settings, records, declared: &declared, factorisation: None }, true)
 }
 
 /// A new controller on the plant and region of a run that was kept, designed on `model`.

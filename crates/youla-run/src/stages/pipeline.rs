@@ -15,7 +15,7 @@ use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
-use crate::stages::recommend::{defects, recommend, weigh};
+use crate::stages::recommend::{defects, is_of_outliers, recommend, weigh};
 use crate::stages::redesign::{pid, redesigned};
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
@@ -56,12 +56,13 @@ pub fn identify(
     let context =
         factors.and_then(|f| Some(SchemeContext { run, factorisation: &f.factorisation, signals: f.signals()? }));
     let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
+    let outliers = data.findings.iter().any(is_of_outliers);
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
             None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
             Some(_) => Default::default(),
         };
-        rayon::join(|| recommend(run), others)
+        rayon::join(|| recommend(run, outliers), others)
     });
     let (s, grey_box) = s;
     let (mut recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);

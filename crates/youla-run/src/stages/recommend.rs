@@ -3,9 +3,12 @@
 use crate::check::{DataCheck, OF_SETTINGS};
 use crate::stages::context::RunContext;
 use crate::{Error, Result};
+use rayon::prelude::*;
+use youla::Mat;
 use youla::identify::likelihood::{Evidence, Recommendation};
 use youla::identify::{Identified, identify, identify_response};
-use youla_loop::check::{Finding, Severity, Test};
+use youla::signal::LoopRecord;
+use youla_loop::check::{CheckOptions, Finding, Severity, Test, output_outliers};
 
 /// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
 /// outliers have tests and consequences of their own.
@@ -20,8 +23,30 @@ pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
 /// Tests of the data with a test or a consequence of their own in the verdict.
 const OWN: [Test; 2] = [Test::Controller, Test::Outliers];
 
+/// Whether a finding is of wrong samples that make much of the innovation: the model is estimated without them.
+pub(crate) fn is_of_outliers(finding: &Finding) -> bool {
+    finding.test == Test::Outliers && finding.severity > Severity::Note && finding.numbers.contains_key("share")
+}
+
+/// Records with the errors of those samples of their outputs.
+fn with_errors(records: &[LoopRecord], options: &CheckOptions) -> Result<Vec<LoopRecord>> {
+    let of = |record: &LoopRecord| {
+        let mut errors = Mat::<f64>::zeros(record.samples(), record.outputs());
+        for (output, found) in output_outliers(record.u(), record.y(), options)?.iter().enumerate() {
+            if found.share >= options.outlier_share {
+                found.samples.iter().zip(&found.sizes).for_each(|(k, size)| errors[(*k, output)] = *size);
+            }
+        }
+        Ok(record.clone().with_output_errors(errors)?)
+    };
+    records.par_iter().map(of).collect()
+}
+
 /// Defects that the verdict has weighed and found harmless are cautions: a run lists no defect beside a trusted model.
 pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
+    for finding in data.findings.iter_mut().filter(|f| is_of_outliers(f)) {
+        finding.what += "; the recommended model is estimated without them";
+    }
     let weighed = |f: &&mut Finding| f.severity == Severity::Defect && OWN.contains(&f.test);
     for finding in data.findings.iter_mut().filter(weighed).filter(|_| model.trusted()) {
         finding.severity = Severity::Caution;
@@ -29,11 +54,11 @@ pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
     }
 }
 
-/// The recommended model of the records of a run, or of its measured response.
+/// The recommended model of the records of a run, or of its measured response; with `outliers` wrong samples of the outputs are looked for.
 ///
 /// # Errors
 /// Those of [`identify`], within `[recommended]`.
-pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
+pub(crate) fn recommend(run: RunContext<'_>, outliers: bool) -> Result<Recommendation> {
     let (records, running) = (run.records, &run.declared.running);
     let mut options = run.settings.recommended.clone();
     if run.settings.data.outputs.iter().any(|c| c.sampled_every.is_some()) {
@@ -49,6 +74,11 @@ pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
         }
         return Ok(found);
     }
-    let found = identify(&records.estimation, &records.verification, running, nominal, &options);
+    let found = if outliers {
+        let with_errors = |records| with_errors(records, &run.settings.check);
+        identify(&with_errors(&records.estimation)?, &with_errors(&records.verification)?, running, nominal, &options)
+    } else {
+        identify(&records.estimation, &records.verification, running, nominal, &options)
+    };
     found.map(|Identified { model, .. }| model).map_err(within)
 }

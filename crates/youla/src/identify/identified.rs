@@ -217,11 +217,12 @@ fn experiments(signals: &[Signals]) -> Vec<Experiment<'_>> {
     signals.iter().map(|s| Experiment::new(s.u.as_ref(), s.y.as_ref())).collect()
 }
 
-/// Outputs without the disturbances of known shape that explain them best, least squares.
+/// Outputs without their known errors, and without the disturbances of known shape that explain them best, least squares.
 fn without_known(r: &LoopRecord) -> Result<Mat<f64>> {
-    let Some(w) = r.disturbance() else { return Ok(r.y().to_owned()) };
-    let found = least_squares("the disturbances of known shape", w, r.y())?;
-    Ok(r.y() - w * found.x)
+    let y = r.output_errors().map_or_else(|| r.y().to_owned(), |errors| r.y() - errors);
+    let Some(w) = r.disturbance() else { return Ok(y) };
+    let found = least_squares("the disturbances of known shape", w, y.as_ref())?;
+    Ok(y - w * found.x)
 }
 
 fn deviation(

@@ -30,6 +30,7 @@ pub struct LoopRecord {
     reference: Option<Mat<f64>>,
     alpha: Option<Mat<f64>>,
     disturbance: Option<Mat<f64>>,
+    output_errors: Option<Mat<f64>>,
     channels: Option<[Vec<Channel>; 2]>,
 }
 
@@ -49,6 +50,7 @@ impl LoopRecord {
             reference: None,
             alpha: None,
             disturbance: None,
+            output_errors: None,
             channels: None,
         };
         let columns = y.ncols();
@@ -93,13 +95,23 @@ impl LoopRecord {
         Ok(LoopRecord { disturbance: Some(signals), ..self })
     }
 
-    /// With the same excitation and other inputs and outputs, without disturbances of known shape: a further experiment.
+    /// With known errors of the measured outputs, N x p, which the controller saw: wrong samples of a sensor, as the check of the data finds
+    /// them. The model is that of `y` without them; the law of the controller is that of `y` as it is.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_output_errors(self, errors: Mat<f64>) -> Result<Self> {
+        let errors = self.signal("the errors of the outputs", errors, self.outputs())?;
+        Ok(LoopRecord { output_errors: Some(errors), ..self })
+    }
+
+    /// With the same excitation and other inputs and outputs, without disturbances of known shape and errors: a further experiment.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn with_response(&self, u: Mat<f64>, y: Mat<f64>) -> Result<Self> {
         let (u, y) = (self.signal("u", u, self.inputs())?, self.signal("y", y, self.outputs())?);
-        Ok(LoopRecord { u, y, disturbance: None, ..self.clone() })
+        Ok(LoopRecord { u, y, disturbance: None, output_errors: None, ..self.clone() })
     }
 
     /// With names and units of inputs and outputs, for messages and figures.
@@ -173,6 +185,11 @@ impl LoopRecord {
     /// Disturbances of known shape, N x signals.
     pub fn disturbance(&self) -> Option<MatRef<'_, f64>> {
         self.disturbance.as_ref().map(|w| w.as_ref())
+    }
+
+    /// Known errors of the measured outputs.
+    pub fn output_errors(&self) -> Option<MatRef<'_, f64>> {
+        self.output_errors.as_ref().map(|e| e.as_ref())
     }
 
     /// Names and units of inputs and outputs, where they were given.

@@ -317,3 +317,34 @@ fn a_law_that_goes_on_from_the_limited_input_is_the_stated_one() {
     assert!(right.trusted(), "{:?}", right.reasons());
     assert!(!outcome(&wrong, "(controller)").note.contains("before a limit"), "{}", outcome(&wrong, "(controller)"));
 }
+
+/// Fifteen samples of the sensor are off by 3, noise is 0.02, and the controller acts on them. Where these errors are known the model is nearer
+/// to the plant, about as far as their share of the noise says, sevenfold; the law of the controller is that of the log in both cases.
+#[test]
+fn known_errors_of_the_outputs_are_neither_noise_nor_another_law() {
+    let (g, rng) = (plant(1.0), &mut ChaCha8Rng::seed_from_u64(5));
+    let samples = CLEAN.samples;
+    let mut normal = |size: f64| Mat::from_fn(samples, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+    let (d, n) = (normal(1.0), normal(0.02));
+    let errors = Mat::from_fn(samples, 1, |k, _| if k % 397 == 200 { 3.0 } else { 0.0 });
+    let (mut u, mut y, mut x) = (d.clone(), &n + &errors, Mat::<f64>::zeros(3, 1));
+    for k in 0..samples {
+        y[(k, 0)] += (g.c() * &x)[(0, 0)];
+        u[(k, 0)] -= 0.8 * y[(k, 0)];
+        x = g.a() * &x + g.b() * u[(k, 0)];
+    }
+    let record = LoopRecord::new(time(), u, y).unwrap().with_input_excitation(d).unwrap();
+    let known = record.clone().with_output_errors(errors).unwrap();
+    let omega: Vec<f64> = [2.0, 10.0, 30.0, 55.0, 65.0, 100.0].map(|hz| std::f64::consts::TAU * hz).to_vec();
+    let of_plant = frequency_response(&g, &omega).unwrap();
+    let [as_noise, without] = [record, known].map(|record| {
+        let running = RunningController::new(controller(1.0));
+        let found = identify(&[record], &[], &running, None, &LikelihoodOptions::default()).unwrap();
+        assert!(outcome(&found, "(controller)").figure < 1e-6, "{}", outcome(&found, "(controller)"));
+        let own = frequency_response(&found.model.plant, &omega).unwrap();
+        (0..omega.len())
+            .map(|k| ((own.at(k) - of_plant.at(k))[(0, 0)] / of_plant.at(k)[(0, 0)]).norm_sqr())
+            .sum::<f64>()
+    });
+    assert!(without < 0.1 * as_noise, "{without:.2e} {as_noise:.2e}");
+}

@@ -15,14 +15,14 @@ use youla::lti::{Discrete, StateSpace};
 use youla_loop::redesign::structured::PidRedesign;
 use youla_loop::redesign::{Redesign, RedesignOptions};
 
-/// The recommended model of a run without anything else; paths are relative to `folder`.
+/// The recommended model of a run without anything else, wrong samples not looked for; paths are relative to `folder`.
 ///
 /// # Errors
 /// Those of [`crate::identify`] and of [`youla::identify()`].
 pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Recommendation> {
     settings.check()?;
     let declared = declared_loop(settings, records, folder)?;
-    recommend(RunContext { settings, records, declared: &declared, factorisation: None }, true)
+    recommend(RunContext { settings, records, declared: &declared, factorisation: None }, false)
 }
 
 /// A new controller on the plant and region of a run that was kept, designed on `model`.

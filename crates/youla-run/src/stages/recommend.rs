@@ -42,7 +42,8 @@ fn with_errors(records: &[LoopRecord], options: &CheckOptions) -> Result<Vec<Loo
     records.par_iter().map(of).collect()
 }
 
-/// Defects that the verdict has weighed and found harmless are cautions: a run lists no defect beside a trusted model.
+/// What the model makes of findings: without wrong samples it was estimated; defects that the verdict has weighed and found harmless are cautions, as a
+/// run lists no defect beside a trusted model.
 pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
     for finding in data.findings.iter_mut().filter(|f| is_of_outliers(f)) {
         finding.what += "; the recommended model is estimated without them";

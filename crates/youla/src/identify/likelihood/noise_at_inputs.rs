@@ -5,12 +5,14 @@ use super::search::chart::Chart;
 use super::search::linearise::linearise;
 use super::search::model::Model;
 use super::search::noise::Noise;
+use super::search::point::Point;
 use super::search::with_best_ends;
 use super::search::{SearchOptions, deviance, driven, driven_slope, search};
 use super::{Discrete, Experiment, LikelihoodOptions, Predictor, recommend};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::lti::{StateSpace, frequency_response, simulate};
 use crate::{Mat, c64};
+use faer::linalg::solvers::DenseSolveCore;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -50,7 +52,7 @@ fn unscaled(u: &Mat<f64>, y: &Mat<f64>) -> Spectra {
 fn of_the_machine(u: &Mat<f64>, y: &Mat<f64>) -> (f64, Noise) {
     let (spectra, plant) = (unscaled(u, y), machine(0.98));
     let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
-    deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), (40, false))
+    deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40)
 }
 
 /// `|G|^2` at one line.
@@ -134,7 +136,7 @@ fn the_slope_of_noise_at_the_input_is_that_of_its_likelihood() {
     let (spectra, plant) = (unscaled(&u, &y), machine(0.97));
     let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
     let point = with_best_ends(&spectra, model.clone(), &Noise::white(1));
-    let (_, noise) = deviance(&spectra, &point, (40, false));
+    let (_, noise) = deviance(&spectra, &point, 40);
     let ratio = noise.regression[0].driven.as_ref().unwrap().entry.ratio;
     let (lines, residuals) = (&spectra.records[0], point.residuals(&spectra));
     let shape = |model: &Model, k: usize| 1.0 + ratio * model.response(lines.z[k])[0].norm_sqr();
@@ -161,14 +163,8 @@ fn the_slope_of_noise_at_the_input_is_that_of_its_likelihood() {
     }
 }
 
-/// Half the deviance of a model whose noise at the inputs has the size and colour of `noise`, and its autoregression.
-fn half_deviance(spectra: &Spectra, model: Model, noise: &Noise) -> f64 {
-    let mut noise = noise.clone();
-    for (output, regression) in noise.regression.iter_mut().enumerate() {
-        let entry = regression.driven.as_ref().unwrap().entry;
-        regression.driven = driven::Driven::of_entry(&model, &[], (output, entry)).map(Into::into);
-    }
-    let point = with_best_ends(spectra, model, &noise);
+/// Covariance of the innovations of a point.
+fn covariance(spectra: &Spectra, point: &Point, noise: &Noise) -> Mat<f64> {
     let (lines, v, p) = (&spectra.records[0], &point.residuals(spectra)[0], spectra.outputs);
     let mut products = Mat::<f64>::zeros(p, p);
     let mut filters = vec![c64::ZERO; p];
@@ -177,9 +173,19 @@ fn half_deviance(spectra: &Spectra, model: Model, noise: &Noise) -> f64 {
         let e: Vec<c64> = (0..p).map(|i| filters[i] * v[k * p + i] * lines.weight[k]).collect();
         products += Mat::from_fn(p, p, |i, j| (e[i] * e[j].conj()).re);
     }
-    let samples = spectra.samples() as f64;
+    products * faer::Scale(1.0 / spectra.samples() as f64)
+}
+
+/// Half the deviance of a model whose noise at the inputs has the size and colour of `noise`, and its autoregression.
+fn half_deviance(spectra: &Spectra, model: Model, noise: &Noise) -> f64 {
+    let mut noise = noise.clone();
+    for (output, regression) in noise.regression.iter_mut().enumerate() {
+        let entry = regression.driven.as_ref().unwrap().entry;
+        regression.driven = driven::Driven::of_entry(&model, &[], (output, entry)).map(Into::into);
+    }
+    let point = with_best_ends(spectra, model, &noise);
     let outside: f64 = point.model.poles().iter().map(|p| p.norm().ln().max(0.0)).sum();
-    0.5 * samples * ((products * faer::Scale(1.0 / samples)).determinant().ln() + 2.0 * outside)
+    0.5 * spectra.samples() as f64 * (covariance(spectra, &point, &noise).determinant().ln() + 2.0 * outside)
 }
 
 /// Slopes by the rows whose filter moves, against central differences: a stable and an unstable plant, white noise and noise with a colour,
@@ -204,8 +210,8 @@ fn rows_with_a_filter_that_moves_have_the_slope_of_the_likelihood() {
             noise.regression[output].driven = driven::Driven::of_entry(&model, &[], (output, entry)).map(Into::into);
         }
         // The size of the innovations belongs to the point.
-        let residuals = with_best_ends(&spectra, model.clone(), &noise).residuals(&spectra);
-        noise.cover(&spectra, &residuals);
+        let of_point = covariance(&spectra, &with_best_ends(&spectra, model.clone(), &noise), &noise);
+        noise.root = of_point.llt(faer::Side::Lower).unwrap().L().partial_piv_lu().inverse();
         let point = with_best_ends(&spectra, model.clone(), &noise);
         let chart = Chart::new(&point.model, false);
         let factor = linearise(&spectra, &point, &chart, &noise).factor;

@@ -107,7 +107,7 @@ fn the_likelihood_of_an_autoregression_is_that_of_its_innovations() {
     let spectra = unscaled(&normal(rng, samples, 1, 1.0), &y, &[0], 0);
     let empty =
         Point { model: Model { inputs: 1, outputs: 1, blocks: Vec::new(), d: vec![0.0] }, ends: vec![vec![0.0]] };
-    let (value, noise) = deviance(&spectra, &empty, (12, false));
+    let (value, noise) = deviance(&spectra, &empty, 12);
     // Schwarz's criterion finds the order, the coefficients have deviations sqrt((1 - 0.8^2) / N) = 0.0042
     assert_eq!(noise.regression[0].coefficients.len(), 2);
     assert!(
@@ -132,7 +132,7 @@ fn a_random_walk_below_white_noise_takes_a_slow_pole_and_a_zero() {
     let empty =
         Point { model: Model { inputs: 1, outputs: 1, blocks: Vec::new(), d: vec![0.0] }, ends: vec![vec![0.0]] };
     let ended = with_best_ends(&spectra, empty.model, &Noise::white(1));
-    let (value, noise) = deviance(&spectra, &ended, (12, false));
+    let (value, noise) = deviance(&spectra, &ended, 12);
     // the sum is (1 - b/z) e / (1 - 1/z) with (1 - b)^2 / b = 0.02^2, so b = 0.98 and the variance of e is 1 / b
     let Regression { coefficients, zero, .. } = &noise.regression[0];
     assert!(
@@ -188,7 +188,7 @@ fn states_are_a_matter_of_choice() {
     let other = StateSpace::new(&back * a * &t, &back * b, c * &t, Mat::zeros(1, 2), time()).unwrap();
     let figures = |system: &StateSpace<Discrete>| {
         let point = reblocked(&with_best_ends(&spectra, blocks_of(system), &Noise::white(1))).unwrap();
-        let (value, noise) = deviance(&spectra, &point, (12, false));
+        let (value, noise) = deviance(&spectra, &point, 12);
         let chart = Chart::new(&point.model, false);
         let root = inverse_root(&linearise(&spectra, &point, &chart, &noise).factor, chart.parameters());
         let spread = chart.response_slopes(&point.model, c64::cis(0.2))

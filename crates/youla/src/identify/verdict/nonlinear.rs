@@ -18,7 +18,7 @@ use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
-use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
+use crate::identify::likelihood::search::linearise::{Extra, Filter, linearise_with};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
@@ -124,13 +124,8 @@ impl<'a> Beside<'a> {
             .collect();
         let values: Vec<Vec<c64>> = records.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
         let chart = Chart::new(model, found.feedthrough);
-        let extra = Extra {
-            count: shapes.len() * spectra.inputs + 1,
-            values: &values,
-            quick: false,
-            held: true,
-            coefficients: false,
-        };
+        let count = shapes.len() * spectra.inputs + 1;
+        let extra = Extra { count, values: &values, quick: false, filter: Filter::Held };
         let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
         let explained = energy(spectra, &clean, &found.noise).max(TINY);
         Beside { spectra, model, shapes, records, explained, factor, lengths }

@@ -110,7 +110,7 @@ impl Problem<'_> {
             let start = start_of(step);
             let states = start.order() as f64;
             let point = with_best_inputs(&thin, start, noise, self.feedthrough);
-            (deviance(&thin, &point, (NOISE_ORDER, false)).0 * every as f64 + per_order * states, step)
+            (deviance(&thin, &point, NOISE_ORDER).0 * every as f64 + per_order * states, step)
         };
         let steps = self.steps(best, &around, &sets);
         let mut starts: Vec<(f64, Step)> = steps.into_par_iter().map(judged).collect();
@@ -216,7 +216,7 @@ impl Problem<'_> {
         let halves = (0..parts.blocks.len()).filter_map(|k| halved(parts, k));
         let judged = halves.map(|model| {
             let point = with_best_inputs(&thin, model.clone(), noise, self.feedthrough);
-            (deviance(&thin, &point, (NOISE_ORDER, false)).0, model)
+            (deviance(&thin, &point, NOISE_ORDER).0, model)
         });
         let (_, model) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let start = with_best_inputs(spectra, model, noise, self.feedthrough);

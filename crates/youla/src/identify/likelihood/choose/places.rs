@@ -61,7 +61,7 @@ impl<'a> Places<'a> {
         let (m, p, noise) = (spectra.inputs, spectra.outputs, &choice.found.noise);
         let point = with_best_ends(spectra, choice.found.point.model.clone(), noise);
         // Few large steps have a colour as well, of which they would be what is expected.
-        let plain = noise.has_a_colour().then(|| deviance(spectra, &point, (NOISE_ORDER, false)).1);
+        let plain = noise.has_a_colour().then(|| deviance(spectra, &point, NOISE_ORDER).1);
         let noise = plain.as_ref().unwrap_or(noise);
         let model = &point.model;
         let unit = 1.0 / (lines.samples as f64).sqrt();

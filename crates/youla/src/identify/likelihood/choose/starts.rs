@@ -127,9 +127,9 @@ impl Problem<'_> {
             let criterion = of_white(thin, &point) * every as f64 + per_order * order as f64;
             return criterion.is_finite().then_some(Judged { criterion, order, source, model: point.model });
         }
-        let (first, noise) = deviance(thin, &point, (NOISE_ORDER, false));
+        let (first, noise) = deviance(thin, &point, NOISE_ORDER);
         let again = with_best_inputs(thin, point.model.clone(), &noise, self.feedthrough);
-        let (second, _) = deviance(thin, &again, (NOISE_ORDER, false));
+        let (second, _) = deviance(thin, &again, NOISE_ORDER);
         let (value, point) = if second < first { (second, again) } else { (first, point) };
         let criterion = value * every as f64 + per_order * order as f64;
         value.is_finite().then_some(Judged { criterion, order, source, model: point.model })

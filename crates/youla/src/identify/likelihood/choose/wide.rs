@@ -116,7 +116,7 @@ impl Problem<'_> {
         let judged = |spectra: &Spectra| {
             let thin = spectra.thinned(spectra.every(COMPARED));
             let point = with_best_inputs(&thin, at.found.point.model.clone(), noise, self.feedthrough);
-            deviance(&thin, &point, (NOISE_ORDER, false)).0 * spectra.every(COMPARED) as f64
+            deviance(&thin, &point, NOISE_ORDER).0 * spectra.every(COMPARED) as f64
         };
         let now = judged(here);
         let others: Vec<Vec<usize>> = self

@@ -8,7 +8,7 @@ use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::by_output::{Arrow, Ends, Normal, inverse};
 use crate::identify::likelihood::search::chart::{Chart, Places};
-use crate::identify::likelihood::search::linearise::{Extra, has_columns, linearise_with, without_last};
+use crate::identify::likelihood::search::linearise::{Extra, Filter, linearise_with, without};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
@@ -46,12 +46,11 @@ impl Root {
     pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise, nuisance: &Nuisance) -> Self {
         if chart.units.is_empty() {
             // In a loop the coefficients of the noise are not independent of those of the plant.
-            let coefficients = has_columns(noise);
-            let extra =
-                Extra { count: nuisance.count, values: &nuisance.values, quick: false, held: false, coefficients };
-            let count = nuisance.count + if coefficients { noise.parameters() } else { 0 };
+            let (count, values) = (nuisance.count, &nuisance.values);
+            let extra = Extra { count, values, quick: false, filter: Filter::Free };
             let factor = linearise_with(spectra, point, chart, noise, &extra).factor;
-            return Root::dense(inverse_root(&without_last(factor, count), chart.parameters()));
+            let parameters = chart.parameters();
+            return Root::dense(inverse_root(&without(factor, parameters..parameters + count), parameters));
         }
         let normal = Normal::new(spectra, point, chart, noise, Ends::Shared).reduced();
         Root::of_arrow(&normal.factor(0.0), chart, &point.model)

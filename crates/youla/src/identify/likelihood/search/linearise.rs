@@ -41,21 +41,25 @@ pub(crate) struct Extra<'a> {
     pub(crate) values: &'a [Vec<c64>],
     /// Whether normal equations suffice; orthogonal triangles otherwise.
     pub(crate) quick: bool,
-    /// Whether the filter of the noise is held: it is not that of the model.
-    pub(crate) held: bool,
-    /// Whether the coefficients of the noise have columns, behind those of the parameters.
-    pub(crate) coefficients: bool,
+    /// What the filter of the noise does.
+    pub(crate) filter: Filter,
+}
+
+/// What the filter of the noise does while the parameters move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Filter {
+    /// It stays: it is not that of the model, or a search takes fewer steps so.
+    Held,
+    /// Noise at the inputs moves it with the plant.
+    Moves,
+    /// The same, and the coefficients of the noise are free.
+    Free,
 }
 
 /// The triangular factor of all records at a point.
 pub(crate) fn linearise(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Linearised {
-    linearise_with(
-        spectra,
-        point,
-        chart,
-        noise,
-        &Extra { count: 0, values: &[], quick: false, held: false, coefficients: false },
-    )
+    let extra = Extra { count: 0, values: &[], quick: false, filter: Filter::Moves };
+    linearise_with(spectra, point, chart, noise, &extra)
 }
 
 /// The same by normal equations, for a step of a search.
@@ -63,13 +67,9 @@ pub(crate) fn linearise_quickly(
     spectra: &Spectra,
     point: &Point,
     (chart, noise): (&Chart, &Noise),
-    held: bool,
+    filter: Filter,
 ) -> Linearised {
-    let coefficients = !held && has_columns(noise);
-    let extra = Extra { count: 0, values: &[], quick: true, held, coefficients };
-    let Linearised { factor, ends } = linearise_with(spectra, point, chart, noise, &extra);
-    let count = if coefficients { noise.parameters() } else { 0 };
-    Linearised { factor: without_last(factor, count), ends }
+    linearise_with(spectra, point, chart, noise, &Extra { count: 0, values: &[], quick: true, filter })
 }
 
 /// The same with further columns behind those of the parameters.
@@ -80,12 +80,16 @@ pub(crate) fn linearise_with(
     noise: &Noise,
     extra: &Extra<'_>,
 ) -> Linearised {
-    let of_noise = if extra.coefficients { noise.parameters() } else { 0 };
-    let (n, parameters) = (point.model.end_count(), chart.parameters() + of_noise + extra.count);
-    let width = parameters + 1;
+    let coefficients = extra.filter == Filter::Free && noise.parameters() <= MOST_COEFFICIENTS;
+    let of_noise = if coefficients { noise.parameters() } else { 0 };
+    let n = point.model.end_count();
+    let width = chart.parameters() + of_noise + extra.count + 1;
     let mut factor = Mat::<f64>::zeros(0, width);
     let mut ends = Vec::with_capacity(spectra.records.len());
-    let entering = if extra.held { Vec::new() } else { entering(spectra, &point.model, chart, noise) };
+    let entering = match extra.filter {
+        Filter::Held => Vec::new(),
+        Filter::Moves | Filter::Free => entering(spectra, &point.model, chart, noise),
+    };
     for (k, (lines, t)) in spectra.records.iter().zip(&point.ends).enumerate() {
         let values = extra.values.get(k).map_or(&[][..], Vec::as_slice);
         let place = Place {
@@ -95,7 +99,7 @@ pub(crate) fn linearise_with(
             chart,
             noise,
             entering: &entering,
-            coefficients: extra.coefficients,
+            coefficients,
             more: (values, extra.count),
         };
         let r = triangle(place, extra.quick);
@@ -104,7 +108,7 @@ pub(crate) fn linearise_with(
         let rest = r.submatrix(n.min(r.nrows()), n, below, width);
         factor = if factor.nrows() == 0 { rest.to_owned() } else { compressed(&stacked(&factor, &rest.to_owned())) };
     }
-    Linearised { factor, ends }
+    Linearised { factor: without(factor, chart.parameters()..chart.parameters() + of_noise), ends }
 }
 
 /// Noise at the inputs of each output, in the coordinates of a model; `None` where none enters.
@@ -119,21 +123,20 @@ fn entering(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> V
 /// Coefficients of the noise of all outputs that have columns at most: the work grows with the square of their number.
 const MOST_COEFFICIENTS: usize = 100;
 
-/// Whether the coefficients of a noise have columns.
-pub(crate) fn has_columns(noise: &Noise) -> bool {
-    (1..=MOST_COEFFICIENTS).contains(&noise.parameters())
-}
-
-/// The factor `[J N r]` without its columns N, their coefficients free: that of `[N J r]` below and behind N.
-pub(crate) fn without_last(factor: Mat<f64>, count: usize) -> Mat<f64> {
-    let kept = factor.ncols().saturating_sub(count + 1);
+/// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N.
+pub(crate) fn without(factor: Mat<f64>, columns: Range<usize>) -> Mat<f64> {
+    let (first, count) = (columns.start, columns.len());
     if count == 0 {
         return factor;
     }
-    let moved = count + kept;
-    let place = |j: usize| if j < moved { (j + kept) % moved } else { j };
+    let place = |j: usize| match j {
+        j if j < count => first + j,
+        j if j < first + count => j - count,
+        j => j,
+    };
     let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
-    factor.submatrix(count, count, factor.nrows().saturating_sub(count), kept + 1).to_owned()
+    let rows = factor.nrows().saturating_sub(count);
+    factor.submatrix(count, count, rows, factor.ncols() - count).to_owned()
 }
 
 pub(crate) fn stacked(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {

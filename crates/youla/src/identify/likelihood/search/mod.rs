@@ -33,7 +33,7 @@ use chart::Chart;
 use driven::has_line;
 use faer::Mat;
 use groups::grouped;
-use linearise::{Linearised, linearise_quickly};
+use linearise::{Filter, Linearised, linearise_quickly};
 use model::Model;
 use noise::Noise;
 use point::Point;
@@ -114,10 +114,15 @@ fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
     samples.ln() * parameters as f64 + of_ends
 }
 
-/// -2 log likelihood and noise of a point.
-pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: (usize, bool)) -> (f64, Noise) {
+/// -2 log likelihood and noise of a point; noise at the inputs is white.
+pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
+    deviance_of(spectra, point, (noise_order, false))
+}
+
+/// The same with noise at the inputs that may have a colour.
+fn deviance_of(spectra: &Spectra, point: &Point, noise: (usize, bool)) -> (f64, Noise) {
     let residuals = point.residuals(spectra);
-    let noise = Noise::fit(spectra, &residuals, noise_order, &point.model);
+    let noise = Noise::fit(spectra, &residuals, noise, &point.model);
     (of_noise(spectra, &noise, &point.model), noise)
 }
 
@@ -129,14 +134,14 @@ fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
 pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
     let chart = Chart::inputs_only(&model, feedthrough);
     let point = Point::at_rest(model, spectra.records.len());
-    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), true).trial(&point, LEAST_DAMPING).0
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), Filter::Held).trial(&point, LEAST_DAMPING).0
 }
 
 /// The ends of the records by least squares, the model kept.
 pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> Point {
     let chart = Chart::fixed(&model);
     let point = Point::at_rest(model, spectra.records.len());
-    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), true).trial(&point, 0.0).0
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new(), Filter::Held).trial(&point, 0.0).0
 }
 
 /// Searches from a start, on many lines first on groups of them; `None` where nothing finite comes of it.
@@ -178,8 +183,8 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
 
 /// What a search makes small, and the noise of the point.
 fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
-    let (value, noise) =
-        deviance(spectra, point, (options.noise_order, options.filter_moves && !separable(spectra.outputs)));
+    let coloured = options.filter_moves && !separable(spectra.outputs);
+    let (value, noise) = deviance_of(spectra, point, (options.noise_order, coloured));
     (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
 }
 
@@ -198,12 +203,9 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
         let moves = filter_moves && noise.enters_at_inputs();
-        let mut slope = slope(spectra, &point.model, &chart, (options, moves && !separable(spectra.outputs)));
-        if moves && separable(spectra.outputs) {
-            let of_noise = driven_slope::slope(spectra, &point, &chart, &noise);
-            slope.iter_mut().zip(of_noise).for_each(|(slope, of_noise)| *slope += of_noise);
-        }
-        let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope, !moves);
+        let slope = slope(spectra, &point, (&chart, &noise), (options, moves));
+        let filter = if moves { Filter::Free } else { Filter::Held };
+        let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope, filter);
         let lower = damping.descend(|damping| {
             let (trial, promised) = slopes.trial(&point, damping);
             // A promise that is not a number ends the search as well.
@@ -253,12 +255,18 @@ enum Slopes<'a> {
 
 impl<'a> Slopes<'a> {
     /// With the slope of what is no square.
-    fn new(spectra: &Spectra, point: &Point, (chart, noise): (&'a Chart, &Noise), slope: Vec<f64>, held: bool) -> Self {
+    fn new(
+        spectra: &Spectra,
+        point: &Point,
+        (chart, noise): (&'a Chart, &Noise),
+        slope: Vec<f64>,
+        filter: Filter,
+    ) -> Self {
         if separable(spectra.outputs) {
             let normal = Normal::new(spectra, point, chart, noise, Ends::Shared);
             return Slopes::ByOutput(chart, if slope.is_empty() { normal } else { normal.with_slope(slope) });
         }
-        let Linearised { factor, ends } = linearise_quickly(spectra, point, (chart, noise), held);
+        let Linearised { factor, ends } = linearise_quickly(spectra, point, (chart, noise), filter);
         Slopes::Dense(chart, Linearised { factor: with_slope(factor, &slope), ends })
     }
 
@@ -341,11 +349,24 @@ pub(crate) fn damped(factor: &Mat<f64>, parameters: usize, damping: f64) -> (Vec
 }
 
 /// Slopes of the terms of half the deviance that are no squares.
-fn slope(spectra: &Spectra, model: &Model, chart: &Chart, (options, moves): (&SearchOptions, bool)) -> Vec<f64> {
-    let mut out =
-        if moves { vec![0.0; chart.parameters()] } else { unstable::slope(unstable::outside, spectra, model, chart) };
+fn slope(
+    spectra: &Spectra,
+    point: &Point,
+    (chart, noise): (&Chart, &Noise),
+    (options, moves): (&SearchOptions, bool),
+) -> Vec<f64> {
+    let outside = || unstable::slope(unstable::outside, spectra, &point.model, chart);
+    let mut out = match (moves, separable(spectra.outputs)) {
+        (false, _) => outside(),
+        // Rows whose filter moves have them.
+        (true, false) => vec![0.0; chart.parameters()],
+        (true, true) => {
+            let of_noise = driven_slope::slope(spectra, point, chart, noise);
+            outside().iter().zip(of_noise).map(|(outside, of_noise)| outside + of_noise).collect()
+        }
+    };
     if chart.feedthrough {
-        let slopes = feedthrough::slopes(model, &options.direct);
+        let slopes = feedthrough::slopes(&point.model, &options.direct);
         let first = out.len() - slopes.len();
         out[first..].iter_mut().zip(slopes).for_each(|(o, s)| *o += spectra.samples() as f64 * s);
     }

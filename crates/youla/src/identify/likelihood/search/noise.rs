@@ -80,42 +80,24 @@ impl Noise {
         };
         let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise { regression, ..Noise::white(p) };
-        noise.cover_rest(spectra, &rest);
-        noise
-    }
-
-    /// Covariance of what the noise leaves of its rest behind what the plant makes of noise at its inputs, by output and record.
-    fn cover_rest(&mut self, spectra: &Spectra, rest: &[Vec<Vec<c64>>]) {
-        let p = spectra.outputs;
         let mut sum = Mat::<f64>::zeros(p, p);
         for (k, lines) in spectra.records.iter().enumerate() {
             let rest: Vec<&[c64]> = rest.iter().map(|rest| rest[k].as_slice()).collect();
-            let of = |range| Arch::new().dispatch(Products { noise: self, lines, rest: &rest, range });
+            let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, rest: &rest, range });
             parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
         }
-        let samples = spectra.samples().max(1) as f64;
+        let samples = samples.max(1) as f64;
         for i in 0..p {
             for j in 0..=i {
                 let value = sum[(i, j)] / samples + if i == j { ROUNDING * ROUNDING } else { 0.0 };
                 (sum[(i, j)], sum[(j, i)]) = (value, value);
             }
         }
-        self.set_covariance(sum);
+        noise.set_covariance(sum);
         if separable(p) {
-            self.set_independent();
+            noise.set_independent();
         }
-    }
-
-    /// The same of residuals, lines x p per record, for coefficients that are known.
-    #[cfg(test)]
-    pub(crate) fn cover(&mut self, spectra: &Spectra, residuals: &[Vec<c64>]) {
-        let of = |(i, regression): (usize, &Regression)| {
-            let own: Vec<Vec<c64>> =
-                residuals.iter().map(|v| v.iter().skip(i).step_by(spectra.outputs).copied().collect()).collect();
-            regression.driven.as_ref().map_or(own.clone(), |driven| driven.rest(spectra, &own))
-        };
-        let rest: Vec<Vec<Vec<c64>>> = self.regression.iter().enumerate().map(of).collect();
-        self.cover_rest(spectra, &rest);
+        noise
     }
 
     /// Counts the innovations of the outputs as independent.

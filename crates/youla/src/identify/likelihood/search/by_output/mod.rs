@@ -17,7 +17,7 @@ mod tests;
 pub(crate) use arrow::{Arrow, inverse};
 
 use super::chart::{Chart, Entry, Places};
-use super::linearise::Extra;
+use super::linearise::{Extra, Filter};
 use super::noise::Noise;
 use super::point::Point;
 use crate::identify::likelihood::data::spectra::Spectra;
@@ -87,13 +87,8 @@ pub(crate) struct Normal {
 impl Normal {
     /// At a point, in the coordinates of [`Chart::by_outputs`] or of a part of them.
     pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise, ends: Ends) -> Self {
-        Normal::with(
-            spectra,
-            point,
-            chart,
-            noise,
-            (ends, &Extra { count: 0, values: &[], quick: true, held: true, coefficients: false }),
-        )
+        let extra = Extra { count: 0, values: &[], quick: true, filter: Filter::Held };
+        Normal::with(spectra, point, chart, noise, (ends, &extra))
     }
 
     /// The same with further shared columns.

@@ -45,7 +45,7 @@ pub(crate) struct Rows {
     entered: Vec<Lanes>,
     /// X with them of one block.
     filtered: Vec<Lanes>,
-    /// L of all states of each output.
+    /// L of all states of the plant and of the colours, `L B / (z - c)`, of each output.
     all_left: Vec<Lanes>,
 }
 
@@ -81,7 +81,7 @@ impl Rows {
             innovations: zeros(p),
             entered: zeros(p * m),
             filtered: zeros(s),
-            all_left: zeros(p * model.order()),
+            all_left: zeros(p * (model.order() + m)),
         }
     }
 
@@ -108,7 +108,8 @@ impl Rows {
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
-        if place.entering.iter().any(Option::is_some) {
+        let enters = place.entering.iter().any(Option::is_some);
+        if enters {
             self.innovations(place, (&z, &ends, &u));
         }
         let (mut state, mut column) = (0, model.end_count());
@@ -120,9 +121,11 @@ impl Rows {
         }
         self.drift((&z, &ends), &place.t[state..], state);
         self.direct(place, &u, column);
-        self.gains(place, &z, model.end_count());
+        if enters {
+            self.gains(place, &z, model.end_count());
+        }
         if place.coefficients {
-            self.coefficients(place, &z, model.end_count() + chart.parameters());
+            self.coefficients(place, &z.conj(), model.end_count() + chart.parameters());
         }
         let (more, count) = place.more;
         for o in 0..p {
@@ -160,21 +163,21 @@ impl Rows {
     ) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
         let entries = s * (s + m);
-        let states_of_model = self.all_left.len() / self.filters.len();
         for o in 0..block.c.len() / s {
-            let entering = entering.get(o).and_then(Option::as_ref);
-            self.filtered(block, at[0], (o, entering));
-            let entered = entering.filter(|entering| entering.sees(at[0])).is_some();
-            self.all_left[o * states_of_model + at[0]..][..s].copy_from_slice(&self.left[o * s..][..s]);
+            let entering = entering.get(o).and_then(Option::as_ref).filter(|entering| entering.sees(at[0]));
+            if let Some(entering) = entering {
+                self.filtered(block, at[0], (o, entering));
+            }
+            let x = if entering.is_some() { &self.filtered } else { &self.x };
             for i in 0..s {
                 let left = &self.left[o * s + i];
                 self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
                 self.values[o * columns + at[0] + i].set_product(left, ends);
                 if directions.ncols() > 0 {
-                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &self.filtered[j]));
+                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &x[j]));
                     for j in 0..m {
                         let mut drive = u[j];
-                        if entered {
+                        if entering.is_some() {
                             drive.add_scaled(&self.entered[o * m + j], 1.0);
                         }
                         self.full[s * s + i * m + j].set_product(left, &drive);
@@ -186,7 +189,7 @@ impl Rows {
                 let sum = &mut self.values[o * columns + at[1] + q];
                 *sum = Lanes::ZERO;
                 (0..entries).for_each(|e| sum.add_scaled(&self.full[e], direction[e]));
-                (0..s).for_each(|j| sum.add_scaled(&self.filtered[j], direction[entries + o * s + j]));
+                (0..s).for_each(|j| sum.add_scaled(&x[j], direction[entries + o * s + j]));
             }
         }
     }

@@ -42,12 +42,13 @@ impl Rows {
         }
     }
 
-    /// X of one block as the Kalman filter of an output sees it, `M (B (U + w) + z t + K epsilon)`.
+    /// X of one block as the Kalman filter of an output that sees it has it, `M (B (U + w) + z t + K epsilon)`; its L is kept for `gains`.
     #[inline(always)]
-    pub(super) fn filtered(&mut self, block: &Block, first: usize, (output, entering): (usize, Option<&Entering>)) {
+    pub(super) fn filtered(&mut self, block: &Block, first: usize, (output, entering): (usize, &Entering)) {
         let (s, m) = (block.states, block.b.len() / block.states);
+        let states = self.states_of_filter();
+        self.all_left[output * states + first..][..s].copy_from_slice(&self.left[output * s..][..s]);
         self.filtered[..s].copy_from_slice(&self.x[..s]);
-        let Some(entering) = entering.filter(|entering| entering.sees(first)) else { return };
         for j in 0..s {
             let mut drive = self.innovations[output].scaled(entering.gain(first + j));
             (0..m).for_each(|l| drive.add_scaled(&self.entered[output * m + l], block.b[j * m + l]));
@@ -55,13 +56,22 @@ impl Rows {
         }
     }
 
+    /// States of the plant and of the colours.
+    fn states_of_filter(&self) -> usize {
+        self.all_left.len() / self.filters.len()
+    }
+
     /// `L dK epsilon` of the parameters, whose columns begin at `first`.
     #[inline(always)]
     pub(super) fn gains(&mut self, place: &Place<'_>, z: &Lanes, first: usize) {
+        let states = self.states_of_filter();
         for (o, entering) in place.entering.iter().enumerate() {
             let Some(entering) = entering else { continue };
-            for (state, left) in self.left_of_filter(place.model, z, (o, entering)).iter().enumerate() {
-                let along = left.times(&self.innovations[o]);
+            if let Some(pole) = entering.colour() {
+                self.see_colours(place.model, &z.shifted(-pole).inverse(), (o, entering));
+            }
+            for state in 0..states {
+                let along = self.all_left[o * states + state].times(&self.innovations[o]);
                 for q in 0..place.chart.parameters() {
                     self.values[o * self.columns + first + q].add_scaled(&along, entering.slope(state, q));
                 }
@@ -69,34 +79,28 @@ impl Rows {
         }
     }
 
-    /// L of the states of the plant, then of the colours, `L B / (z - c)`.
+    /// L of the colours, given `1 / (z - c)`.
     #[inline(always)]
-    fn left_of_filter(&self, model: &Model, z: &Lanes, (output, entering): (usize, &Entering)) -> Vec<Lanes> {
+    fn see_colours(&mut self, model: &Model, colour: &Lanes, (output, entering): (usize, &Entering)) {
         let (n, m) = (model.order(), model.inputs);
-        let mut left = vec![Lanes::ZERO; n + m];
-        left[..n].copy_from_slice(&self.all_left[output * n..(output + 1) * n]);
-        let Some(pole) = entering.colour() else { return left };
-        let colour = z.shifted(-pole).inverse();
-        let mut state = 0;
-        for block in &model.blocks {
-            for i in 0..block.states {
-                if entering.sees(state) {
-                    let own = left[state];
-                    (0..m).for_each(|j| left[n + j].add_scaled(&own, block.b[i * m + j]));
-                }
-                state += 1;
+        let all = &mut self.all_left[output * (n + m)..(output + 1) * (n + m)];
+        let (left, of_colours) = all.split_at_mut(n);
+        of_colours.fill(Lanes::ZERO);
+        let rows = model.blocks.iter().flat_map(|block| block.b.chunks(m));
+        for (state, (left, b)) in left.iter().zip(rows).enumerate() {
+            if entering.sees(state) {
+                of_colours.iter_mut().zip(b).for_each(|(sum, b)| sum.add_scaled(left, *b));
             }
         }
-        left[n..].iter_mut().for_each(|left| *left = left.times(&colour));
-        left
+        of_colours.iter_mut().for_each(|sum| *sum = sum.times(colour));
     }
 
     /// The columns of the coefficients of the noise: of a_k `z^-k v / A(z)`, of b `z^-1 v / (1 - b / z)`, of lambda `L dK epsilon`, of the pole
     /// of the colour `L_w w` beside it.
     #[inline(always)]
-    pub(super) fn coefficients(&mut self, place: &Place<'_>, z: &Lanes, first: usize) {
+    pub(super) fn coefficients(&mut self, place: &Place<'_>, back: &Lanes, first: usize) {
         let (p, m, n) = (self.filters.len(), place.model.inputs, place.model.order());
-        let (columns, back) = (self.columns, z.conj());
+        let columns = self.columns;
         let mut column = first;
         for (o, regression) in place.noise.regression.iter().enumerate() {
             let residual = self.values[o * columns + columns - 1];
@@ -105,19 +109,19 @@ impl Rows {
             }
             let zero = back.scaled(-regression.zero).shifted(1.0);
             let mut lagged = residual;
-            lagged.multiply(&regression.behind(&back).times(&zero).inverse());
+            lagged.multiply(&regression.behind(back).times(&zero).inverse());
             for _ in &regression.coefficients {
-                lagged.multiply(&back);
+                lagged.multiply(back);
                 self.values[o * columns + column] = lagged;
                 column += 1;
             }
             if regression.zero != 0.0 {
-                self.values[o * columns + column] = residual.times(&back).times(&zero.inverse());
+                self.values[o * columns + column] = residual.times(back).times(&zero.inverse());
                 column += 1;
             }
             let Some(driven) = &regression.driven else { continue };
             if let Some(Some(entering)) = place.entering.get(o) {
-                let left = self.left_of_filter(place.model, z, (o, entering));
+                let left = &self.all_left[o * (n + m)..(o + 1) * (n + m)];
                 let innovation = self.innovations[o];
                 for which in 0..driven.parameters() {
                     let mut sum = Lanes::ZERO;

@@ -64,7 +64,13 @@ impl Recommendation {
         };
         let bands: Vec<String> =
             self.bands.iter().map(|[low, high]| format!("{} to {} Hz", figure(*low), figure(*high))).collect();
+        let entries = || self.entry_bands.iter().flatten();
+        let own = entries().filter(|bands| !bands.is_empty()).count();
         match bands.len() {
+            0 if own > 0 && (failed == 0 || !self.in_doubt()) => format!(
+                "{first}. No band is valid to 10 % in all {} entries, {own} of them have bands of their own.",
+                entries().count()
+            ),
             0 => format!("{first}. No band is valid to 10 %."),
             _ if failed == 0 => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
             _ if self.in_doubt() => format!("{first}. The model itself is in doubt, at all frequencies."),

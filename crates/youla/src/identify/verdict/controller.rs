@@ -34,6 +34,7 @@ const QUESTION: &str =
 /// The test, with what share of the inputs the law leaves and how many samples were left out.
 pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
     let Some(law) = known.controller else { return Ok(None) };
+    let law = &observable_part(law)?;
     let all: Vec<&LoopSignals<'_>> = known.estimation.iter().chain(&known.verification).collect();
     if all.iter().any(|r| r.excitation.is_none()) {
         return Ok(Some(Evidence::untested(QUESTION, LARGEST_CONTROLLER_ERROR, "no external excitation is known")));
@@ -93,8 +94,9 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
 
 /// Whether the stated controller reproduces the logged inputs closely enough to be used in the estimate.
 pub(crate) fn explains(known: &LoopKnowledge<'_>) -> bool {
-    let Some(law) = known.controller else { return true };
+    let Some(law) = known.controller.and_then(|law| observable_part(law).ok()) else { return true };
     let all: Vec<&LoopSignals<'_>> = known.estimation.iter().collect();
+    let law = &law;
     let (residuals, _) = residuals(law, &filter_gain(law, &all), &all);
     rest(&residuals, &all) < AS_STATED
 }
@@ -149,33 +151,61 @@ fn worst(
     Ok(worst)
 }
 
+/// What the outputs of a law show of its states.
+struct Observed {
+    /// Orthonormal rows that span those of `C, C A, C A^2, ...`.
+    basis: Vec<Mat<f64>>,
+    /// Of each output the rows `c, c A, ...` that are independent of those before them.
+    chains: Vec<Vec<Mat<f64>>>,
+}
+
+impl Observed {
+    fn new(law: &StateSpace<Discrete>) -> Self {
+        let (n, m) = (law.order(), law.outputs());
+        let mut chains: Vec<Vec<Mat<f64>>> = vec![Vec::new(); m];
+        let mut basis: Vec<Mat<f64>> = Vec::new();
+        let mut open: Vec<Option<Mat<f64>>> = (0..m).map(|i| Some(law.c().subrows(i, 1).to_owned())).collect();
+        while basis.len() < n && open.iter().any(Option::is_some) {
+            for i in 0..m {
+                let Some(row) = open[i].take().filter(|_| basis.len() < n) else { continue };
+                let mut rest = row.clone();
+                // Twice is enough (Kahan).
+                for _ in 0..2 {
+                    for b in &basis {
+                        let along = (&rest * b.transpose())[(0, 0)];
+                        rest -= b * Scale(along);
+                    }
+                }
+                let left = rest.norm_l2();
+                if left > INDEPENDENT * row.norm_l2() {
+                    basis.push(rest * Scale(1.0 / left));
+                    open[i] = Some(&row * law.a());
+                    chains[i].push(row);
+                }
+            }
+        }
+        Observed { basis, chains }
+    }
+}
+
+/// The law without states that its outputs do not show, `(Q A Q', Q B, C Q', D)`: an integrator that a PID without an integral gain carries
+/// along leaves the residual of no row a memory.
+fn observable_part(law: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    let basis = Observed::new(law).basis;
+    if basis.len() == law.order() {
+        return Ok(law.clone());
+    }
+    let rows = Mat::from_fn(basis.len(), law.order(), |i, j| basis[i][(0, j)]);
+    let [a, b, c] = [&rows * law.a() * rows.transpose(), &rows * law.b(), law.c() * rows.transpose()];
+    StateSpace::new(a, b, c, law.d().to_owned(), law.time())
+}
+
 /// L after which e forgets within as many samples as the controller has states, `(A - L C)^n = 0`: then e is the residual of the difference
 /// equation. With q_i the vector of the chain of output i, `c_k A^j q_i = 0` for `j < nu_i - 1`, it is `L M = [A^nu_i q_i]`, `M = C [A^(nu_i - 1) q_i]`
 /// (Ackermann's formula for one output). `None` where rounding or different lengths of the chains leave a memory.
 fn deadbeat_gain(law: &StateSpace<Discrete>) -> Option<Mat<f64>> {
     let (n, m) = (law.order(), law.outputs());
-    let mut chains: Vec<Vec<Mat<f64>>> = vec![Vec::new(); m];
-    let mut basis: Vec<Mat<f64>> = Vec::new();
-    let mut open: Vec<Option<Mat<f64>>> = (0..m).map(|i| Some(law.c().subrows(i, 1).to_owned())).collect();
-    while basis.len() < n && open.iter().any(Option::is_some) {
-        for i in 0..m {
-            let Some(row) = open[i].take().filter(|_| basis.len() < n) else { continue };
-            let mut rest = row.clone();
-            // Twice is enough (Kahan).
-            for _ in 0..2 {
-                for b in &basis {
-                    let along = (&rest * b.transpose())[(0, 0)];
-                    rest -= b * Scale(along);
-                }
-            }
-            let left = rest.norm_l2();
-            if left > INDEPENDENT * row.norm_l2() {
-                basis.push(rest * Scale(1.0 / left));
-                open[i] = Some(&row * law.a());
-                chains[i].push(row);
-            }
-        }
-    }
+    let Observed { basis, chains } = Observed::new(law);
     if basis.len() < n || chains.iter().any(Vec::is_empty) {
         return None;
     }

@@ -154,7 +154,7 @@ struct Sums {
     ux: Mat<c64>,
     vx: Mat<c64>,
     vv: Vec<f64>,
-    uu: Vec<f64>,
+    uu: Mat<c64>,
     /// Of the first band, of each octave below its upper edge: `sum |u|^2`, `sum share |u|^2`; zero of the others.
     octaves: [[f64; 2]; OCTAVES],
 }
@@ -177,7 +177,7 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
         ux: zeros(m),
         vx: zeros(p),
         vv: vec![0.0; p],
-        uu: vec![0.0; m],
+        uu: Mat::zeros(m, m),
         octaves: [[0.0; 2]; OCTAVES],
     };
     let mut all: Vec<Sums> = (0..count).map(empty).collect();
@@ -189,7 +189,9 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
             let sums = &mut all[band];
             sums.lines += 1;
             (0..p).for_each(|i| sums.vv[i] += r.v[k * p + i].norm_sqr());
-            (0..m).for_each(|j| sums.uu[j] += r.u[k * m + j].norm_sqr());
+            for j in 0..m {
+                (0..m).for_each(|i| sums.uu[(i, j)] += r.u[k * m + i] * r.u[k * m + j].conj());
+            }
             if band == 0 {
                 let share = 0.5 * (k + 1) as f64 / total as f64;
                 let below = (0.5 / (share * count as f64)).log2() as usize;
@@ -241,7 +243,7 @@ fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
     let explained = |i: usize, k: usize| along[(i, k)].norm_sqr() / eigen.S()[k].re;
     let strong: Vec<usize> = (0..q).filter(|k| eigen.S()[*k].re > least.max(TINY)).collect();
     let free = (sums.lines as f64 - strong.len() as f64).max(1.0);
-    let left = |i: usize| (sums.uu[i] - strong.iter().map(|k| explained(i, *k)).sum::<f64>()).max(0.0) / free;
+    let left = |i: usize| (sums.uu[(i, i)].re - strong.iter().map(|k| explained(i, *k)).sum::<f64>()).max(0.0) / free;
     let left: Vec<f64> = (0..m).map(left).collect();
     let moves = |k: &usize| (0..m).any(|i| explained(i, *k) > LEAST_EXPLAINED * left[i]);
     let mut inverse = vec![0.0; q];
@@ -284,12 +286,13 @@ fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<
     let explained = |of: &Mat<c64>, i: usize| (0..strong.len()).map(|k| of[(i, k)].norm_sqr()).sum::<f64>();
     // Of correlated lines a sum has the variance of `HANN_LOSS` times as many.
     let noise: Vec<f64> = (0..p).map(|i| ((sums.vv[i] - explained(&v, i)) / free).max(TINY)).collect();
-    let of_inputs: Vec<f64> = (0..m).map(|j| ((sums.uu[j] - explained(&u, j)) / free).max(0.0)).collect();
+    let of_inputs = &sums.uu - &u * u.adjoint();
     let svd = u.thin_svd().ok()?;
     let sizes: Vec<f64> = (0..m.min(strong.len())).map(|k| svd.S()[k].re).collect();
     // A direction of the inputs that the excitation hardly moves shows the noise that the feedback brings there: E would be that of K.
     let moved = |k: usize| {
-        let noise: f64 = (0..m).map(|j| svd.U()[(j, k)].norm_sqr() * of_inputs[j]).sum();
+        let along = svd.U().col(k);
+        let noise = (along.adjoint() * &of_inputs * along).re.max(0.0) / free;
         sizes[k] > LEAST_DIRECTION * sizes[0] && sizes[k] * sizes[k] > LEAST_MOVED * noise
     };
     let rank = (0..sizes.len()).take_while(|k| moved(*k)).count();

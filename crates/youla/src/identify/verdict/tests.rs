@@ -105,6 +105,17 @@ fn a_controller_of_another_gain_is_noticed_and_does_not_spoil_the_model() {
     assert!(sentence.contains("the stated controller disagrees with the log, the model passes its"), "{sentence}");
 }
 
+/// `u = -0.8 y` with an integrator beside it that its output does not show is the law of the log.
+#[test]
+fn a_state_that_the_controller_does_not_show_is_no_memory_of_it() {
+    let of = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    let law = StateSpace::new(of(1.0), of(1.0), of(0.0), of(-0.8), time()).unwrap();
+    let running = RunningController::new(law);
+    let found = identify(&[CLEAN.record(1)], &[], &running, None, &LikelihoodOptions::default()).unwrap();
+    assert!(outcome(&found, "(controller)").figure < 1e-6, "{}", outcome(&found, "(controller)"));
+    assert!(found.trusted(), "{:?}", found.reasons());
+}
+
 #[test]
 fn a_missing_mode_is_named_with_its_frequency() {
     let few = LikelihoodOptions { order: Some(1), ..Default::default() };

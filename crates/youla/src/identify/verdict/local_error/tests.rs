@@ -107,3 +107,26 @@ fn a_sweep_in_the_middle_of_a_record_is_no_error_by_chance() {
     let mean: f64 = squares / count;
     assert!((0.85..1.12).contains(&mean), "{mean} of {count}");
 }
+
+/// Excitation moves the inputs along (1, 1) and 100 times less along (1, -1), noise does as well: both directions are shown, and an error of
+/// the model along the weak one is found.
+#[test]
+fn a_weak_direction_counts_beside_the_noise_along_it() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(7);
+    let mut unit = || c64::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5);
+    let (mut u, mut v, mut x) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..800 {
+        let excitation = [unit(), unit()];
+        let strong = excitation[0] + unit() * 0.05;
+        let weak = (excitation[1] + unit() * 0.05) * 0.01;
+        x.extend(excitation);
+        u.extend([strong + weak, strong - weak]);
+        v.push(weak * 0.2 + unit() * 1e-5);
+    }
+    let channels = Channels { m: 2, p: 1, q: 2 };
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 4, 0);
+    for band in &found.bands {
+        let error = &band.as_ref().unwrap().error;
+        assert!((error[0] - 0.1).norm() < 0.01 && (error[1] + 0.1).norm() < 0.01, "{error:?}");
+    }
+}

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
 use youla::signal::Channel;
 use youla_io::folder::require_place;
-use youla_io::{ChannelRef, Placement, Role, StampedChannel, StampedColumn, Synchronised};
+use youla_io::{ChannelRef, Placement, Role, StampedChannel, StampedColumn, Synchronised, require_free};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -104,9 +104,8 @@ pub(crate) fn synchronise(form: Form, args: &SynchroniseArgs) -> Result<(), Fail
     let what = args.files[0].display().to_string();
     let found = youla_io::synchronise(&what, &channels, time)?;
     let targets: Vec<PathBuf> = (1..=found.records.len()).map(|k| target(&args.out, k, found.records.len())).collect();
-    if let Some(path) = targets.iter().find(|path| path.exists() && !args.force) {
-        return Err(youla_io::Error::FileExists { path: path.clone() }.into());
-    }
+    let read: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
+    targets.iter().try_for_each(|path| require_free(path, args.force, &read))?;
     for (record, path) in found.records.iter().zip(&targets) {
         youla_io::write_csv(record, path)?;
     }

@@ -323,17 +323,6 @@ pub fn add_to_list(run: &Path, files: &[PathBuf]) -> Result<()> {
     replace_file(&path, &names.iter().map(|name| format!("{name}\n")).collect::<String>())
 }
 
-/// Rejects names of files that exist in a folder.
-///
-/// # Errors
-/// [`Error::FileExists`] with the first.
-pub fn refuse_existing(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<()> {
-    match files.iter().map(|(name, _)| folder.join(name)).find(|path| path.exists()) {
-        Some(path) => Err(Error::FileExists { path }),
-        None => Ok(()),
-    }
-}
-
 /// Writes files beside their final places and moves them there when all are whole; after an error none is changed.
 pub fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>> {
     let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();

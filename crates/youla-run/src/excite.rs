@@ -11,8 +11,8 @@ use youla::lti::{Discrete, Partitioned};
 use youla::signal::Channel;
 use youla::signal::{Detrend, Record};
 use youla_io::export::{SequenceFormat, export_sequence};
-use youla_io::folder::{refuse_existing, replace_files};
-use youla_io::{Format, Gaps, Source, TimeSource, read};
+use youla_io::folder::replace_files;
+use youla_io::{Format, Gaps, Source, TimeSource, read, require_free};
 use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
 
 /// Where the excitation enters.
@@ -188,8 +188,6 @@ pub fn write_excitation(
     for format in formats {
         files.push((format!("alpha.{}", format.extension()), export_sequence(&record, *format, &about)?));
     }
-    if !replace {
-        refuse_existing(folder, &files)?;
-    }
+    files.iter().try_for_each(|(name, _)| require_free(&folder.join(name), replace, &[]))?;
     Ok(replace_files(folder, &files)?)
 }

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use youla_io::require_free;
 use youla_rig::{
     Answer, CsvLog, Error, LogReport, Outcome, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings,
 };
@@ -76,9 +77,7 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
     let duration = seconds("--duration", args.duration)?;
     let run_file = args.out.with_file_name("run.toml");
     for path in [&args.out, &run_file, &CsvLog::part_path(&args.out, 2)] {
-        if path.exists() && !args.force {
-            return Err(refused(format!("{} exists already; choose another --out or add --force", path.display())));
-        }
+        require_free(path, args.force, &[])?;
     }
     let base = args.settings.as_deref().map(youla_io::read_text).transpose()?;
     let mut rig = Rig::connect(&args.address)?;

@@ -32,6 +32,7 @@ pub use sequence::{SequenceFormat, export_sequence};
 
 use crate::error::{Error, Result};
 use crate::matfile::mat_to_bytes;
+use crate::target::require_free;
 use crate::values::{Value, Variable};
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
@@ -165,9 +166,7 @@ pub fn export_model(model: &NamedModel, format: ModelFormat) -> Result<Vec<u8>> 
 /// # Errors
 /// [`Error::FileExists`], [`Error::Io`]; nothing is left behind then.
 pub fn write_export(path: &Path, bytes: &[u8], replace: bool) -> Result<()> {
-    if !replace && path.exists() {
-        return Err(Error::FileExists { path: path.to_owned() });
-    }
+    require_free(path, replace, &[])?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
     std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|source| {

@@ -17,7 +17,8 @@ use crate::{Error, Result};
 use run::FinishedRun;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use youla_io::folder::{refuse_existing, replace_files};
+use youla_io::folder::replace_files;
+use youla_io::require_free;
 use youla_report::data::{Method, ReportData, Role, Source};
 use youla_report::html;
 
@@ -82,9 +83,7 @@ pub fn write_comparison(found: &Comparison, page: &Path, replace: bool) -> Resul
     }
     let files = [(name(&data), json), (name(page), html(&found.report)?.into_bytes())];
     let folder = page.parent().unwrap_or(Path::new(""));
-    if !replace {
-        refuse_existing(folder, &files)?;
-    }
+    files.iter().try_for_each(|(name, _)| require_free(&folder.join(name), replace, &[]))?;
     Ok(replace_files(folder, &files).map(|_| ())?)
 }
 

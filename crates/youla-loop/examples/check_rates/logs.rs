@@ -215,7 +215,7 @@ impl Log {
             reference: channels("r", r.as_ref()),
             alpha: Vec::new(),
         };
-        all.extend(check_record(&record, &names, self.controller.as_ref(), &CheckOptions::default())?);
+        all.extend(check_record(&record, &names, self.controller.as_ref().map(Into::into), &CheckOptions::default())?);
         Ok(all)
     }
 }

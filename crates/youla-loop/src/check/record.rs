@@ -5,12 +5,12 @@ use super::outside::{constant, of_excitation, of_lines, of_roles, trends};
 use super::regression::Lagged;
 use super::sequence::{self, Break};
 use super::{
-    CheckOptions, ControllerCheck, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay,
-    feedback, flatline, outliers, quantisation, stuck,
+    CheckOptions, ControllerCheck, ControllerRecord, Declared, Finding, Outliers, Severity, Test, clipping, controller,
+    delay, feedback, flatline, outliers, quantisation, stuck,
 };
 use crate::error::{Error, Result};
 use youla::MatRef;
-use youla::lti::{Discrete, StateSpace};
+use youla::lti::Discrete;
 use youla::signal::Channel;
 
 /// A record as it was logged; row k is time k.
@@ -61,12 +61,12 @@ const SHORTEST: usize = 16;
 pub fn check_record(
     record: &LoggedRecord<'_>,
     names: &ChannelNames,
-    declared: Option<&StateSpace<Discrete>>,
+    declared: Option<Declared<'_>>,
     options: &CheckOptions,
 ) -> Result<Vec<Finding>> {
     options.check()?;
-    let open = declared.map(StateSpace::is_zero);
-    let declared = declared.filter(|k| !k.is_zero());
+    let open = declared.map(|declared| declared.controller.is_zero());
+    let declared = declared.filter(|declared| !declared.controller.is_zero());
     if record.u.nrows() < SHORTEST {
         let what = format!("it has {} samples; the tests require at least {SHORTEST}", record.u.nrows());
         return Ok(vec![Finding::new(Test::Timing, Severity::Caution, record.name, what)]);
@@ -118,7 +118,7 @@ pub fn check_record(
 
 /// The declared controller against the log; `None` where it cannot be simulated.
 fn of_controller(
-    k: &StateSpace<Discrete>,
+    k: Declared<'_>,
     record: &LoggedRecord<'_>,
     names: &ChannelNames,
     options: &CheckOptions,
@@ -209,6 +209,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
     use youla::Mat;
+    use youla::lti::StateSpace;
 
     /// `x+ = 0.9 x + 0.3 u`, `y = x + n`, `u = d - 1.5 y`, all noise white: u, y and d.
     fn clean(seed: u64) -> [Mat<f64>; 3] {
@@ -235,7 +236,7 @@ mod tests {
         let (input_excitation, name, first_row) = (Some(d.as_ref()), "log", 1);
         let (u, y) = (u.as_ref(), y.as_ref());
         let record = LoggedRecord { name, time, first_row, u, y, input_excitation, reference: None, alpha: None };
-        check_record(&record, &names, k.as_ref(), &options).unwrap()
+        check_record(&record, &names, k.as_ref().map(Into::into), &options).unwrap()
     }
 
     /// The excitation is another channel, in its unit or another, with an offset: a defect. Of the input it is a question where nobody

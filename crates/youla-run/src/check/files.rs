@@ -5,10 +5,11 @@ use crate::records::segments::{Part, parts};
 use crate::records::{UsedRows, channels_of, loop_record, refuse_overlap};
 use crate::settings::DataFile;
 use crate::settings::computed::ComputedChannels;
+use crate::stages::factors::DeclaredLoop;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
-use youla::lti::{Discrete, StateSpace};
+use youla::lti::Discrete;
 use youla::signal::LoopRecord;
 use youla::signal::Record;
 use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, check_unit, read, sha256};
@@ -30,7 +31,7 @@ pub(super) struct Job {
 /// A record with its findings.
 pub(super) type CheckedPart = (CheckedRecord, Vec<Finding>);
 
-pub(super) type DeclaredController<'a> = dyn Fn(Discrete) -> Result<Option<StateSpace<Discrete>>> + Sync + 'a;
+pub(super) type DeclaredController<'a> = dyn Fn(Discrete) -> Result<Option<DeclaredLoop>> + Sync + 'a;
 
 /// Name of the time column while a file is read.
 const TIME: &str = "(time)";
@@ -112,12 +113,8 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
         let times = record.column(TIME)?.to_vec();
         let Some(found) = timing(&times, job.time.ts, job.time.tolerance) else {
             let what = file.file.display().to_string();
-            return Err(Error::File(youla_io::Error::NonUniformTime {
-                what,
-                row: 2,
-                dt: times.last().unwrap_or(&0.0) - times[0],
-                ts: 0.0,
-            }));
+            job.time.of_column(&what, &times)?;
+            return Err(Error::File(youla_io::Error::SampleTimeMissing { what }));
         };
         findings = found.findings(&part.name, first);
         time = Discrete::new(job.time.ts.filter(|_| found.unit.is_none()).unwrap_or(found.step))?;
@@ -129,9 +126,9 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
     }
     let logged = loop_record(&record, time, &part.name, job.groups.each_ref())?;
     let names = names(job.groups.each_ref());
-    let controller = controller(time)?;
+    let declared = controller(time)?;
     let (m, p) = (logged.inputs(), logged.outputs());
-    if let Some(k) = controller.as_ref().filter(|k| (k.outputs(), k.inputs()) != (m, p)) {
+    if let Some(k) = declared.as_ref().map(DeclaredLoop::controller).filter(|k| (k.outputs(), k.inputs()) != (m, p)) {
         let (expected, found) = ((m, p), (k.outputs(), k.inputs()));
         return Err(Error::Method(youla::Error::Shape {
             what: "[controller], inputs x outputs of the plant".into(),
@@ -139,7 +136,8 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
             found,
         }));
     }
-    let of_record = check_record(&self::logged(&logged, first), &names, controller.as_ref(), &job.options)?;
+    let stated = declared.as_ref().map(DeclaredLoop::stated);
+    let of_record = check_record(&self::logged(&logged, first), &names, stated, &job.options)?;
     let channels: Vec<&ChannelSpec> = job.groups.iter().flatten().collect();
     findings.extend(job.computed.without_expected(&channels, of_record));
     let rows = [first, first + logged.samples() - 1];

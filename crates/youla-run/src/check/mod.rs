@@ -5,6 +5,7 @@
 //! stretch without any.
 
 mod files;
+mod repeated;
 mod result;
 mod sign;
 
@@ -22,10 +23,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::ErrorKind;
 use youla::identify::subspace::SubspaceOptions;
-use youla::lti::{Discrete, StateSpace};
+use youla::lti::Discrete;
 use youla::signal::LoopRecord;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions};
-use youla_loop::check::{CheckOptions, Finding, Severity, Test, by_severity, check_record};
+use youla_loop::check::{CheckOptions, Declared, Finding, Severity, Test, by_severity, check_record};
 
 /// Files to check without a run.toml; channels by name or number.
 #[derive(Debug, Clone, Default)]
@@ -57,7 +58,7 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     settings.check()?;
     let d = &settings.data;
     let job = job(d, with_order(&settings.check, settings.hansen.as_ref()))?;
-    let controller = |time: Discrete| Ok(Some(DeclaredLoop::new(settings, folder, time)?.controller().clone()));
+    let controller = |time: Discrete| Ok(Some(DeclaredLoop::new(settings, folder, time)?));
     let mut found = check_all(&job, &d.labelled(), folder, &controller)?;
     found.findings.extend(method_finding(settings));
     by_severity(&mut found.findings);
@@ -117,14 +118,14 @@ pub fn check_in_memory(
     settings.check()?;
     settings.check.check()?;
     let declared = controller.then(|| declared_loop(settings, records, folder)).transpose()?;
-    check_records(settings, records, declared.as_ref().map(DeclaredLoop::controller))
+    check_records(settings, records, declared.as_ref().map(DeclaredLoop::stated))
 }
 
-/// The same tests on the records of a run as it uses them, for its report; `controller` with positive feedback.
+/// The same tests on the records of a run as it uses them, for its report.
 pub(super) fn check_records(
     settings: &RunSettings,
     records: &RunRecords,
-    controller: Option<&StateSpace<Discrete>>,
+    controller: Option<Declared<'_>>,
 ) -> Result<DataCheck> {
     let d = &settings.data;
     let names = names(d.groups());
@@ -148,9 +149,11 @@ pub(super) fn check_records(
     };
     let mut found = collected(all.par_iter().map(one).collect())?;
     found.findings.extend(method_finding(settings));
+    found.findings.extend(repeated::repeated(records));
     by_severity(&mut found.findings);
     Ok(found)
 }
+
 /// File and first row of a record of a run.
 fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, usize) {
     if let Some(segment) = records.segments.iter().find(|s| s.record == name) {

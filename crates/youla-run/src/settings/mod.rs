@@ -11,6 +11,7 @@ mod grey_box;
 mod models;
 mod options;
 mod pid;
+mod readings;
 mod reference_path;
 
 pub use cascade::{Cascade, CascadeGains};

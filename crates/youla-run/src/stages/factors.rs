@@ -9,6 +9,7 @@ use youla::control::{ChannelScales, RunningController, closed_loop, with_input_p
 use youla::factor::{CoprimeFactors, loop_factors};
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
+use youla_loop::check::{Declared, Reading};
 
 /// Nominal model and controller as run.toml declares them.
 #[derive(Debug, Clone)]
@@ -17,13 +18,22 @@ pub struct DeclaredLoop {
     pub nominal: Option<StateSpace<Discrete>>,
     /// The controller that ran.
     pub running: RunningController,
+    /// What its numbers may mean where the log contradicts it.
+    readings: Vec<Reading>,
 }
 
 impl DeclaredLoop {
     /// Realises both; paths are relative to `folder`.
     pub(crate) fn new(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<Self> {
         let nominal = settings.nominal.as_ref().map(|nominal| nominal.realise(folder, time)).transpose()?;
-        Ok(DeclaredLoop { running: settings.controller.realise(time, nominal.as_ref(), folder)?, nominal })
+        let running = settings.controller.realise(time, nominal.as_ref(), folder)?;
+        let readings = settings.controller.readings(time, nominal.as_ref(), folder);
+        Ok(DeclaredLoop { nominal, running, readings })
+    }
+
+    /// The controller as the check of the data takes it.
+    pub(crate) fn stated(&self) -> Declared<'_> {
+        Declared { controller: self.controller(), readings: &self.readings }
     }
 
     /// The controller that ran, `u = K y` (positive feedback).

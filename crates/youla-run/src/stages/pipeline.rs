@@ -55,7 +55,7 @@ pub fn identify(
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
     let context =
         factors.and_then(|f| Some(SchemeContext { run, factorisation: &f.factorisation, signals: f.signals()? }));
-    let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
+    let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.stated())))?;
     let outliers = data.findings.iter().any(is_of_outliers);
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {

@@ -5,4 +5,5 @@
 mod common;
 mod controllers;
 mod models;
+mod readings;
 mod settings;

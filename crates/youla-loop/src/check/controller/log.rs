@@ -57,6 +57,7 @@ impl<'a> Log<'a> {
             all.push((Change::WithoutExcitation, self.residual(k, &self.e, &self.record.u.to_owned())?));
             all.push((Change::ExcitationSign, self.residual(k, &self.e, &(self.record.u + d))?));
         }
+        all.extend(self.places_of_excitation(k)?);
         all.extend(self.gains(k)?);
         let p = self.e.ncols();
         for (i, j) in (0..p).flat_map(|i| (i + 1..p).map(move |j| (i, j))) {
@@ -78,6 +79,17 @@ impl<'a> Log<'a> {
         }
         all.extend(self.saturation(k)?);
         Ok(all)
+    }
+
+    /// The only known excitation at the other place.
+    fn places_of_excitation(&self, k: &StateSpace<Discrete>) -> Result<Option<(Change, f64)>> {
+        let ControllerRecord { u, y, input_excitation, reference } = self.record;
+        let (change, e, w) = match (input_excitation, reference) {
+            (None, Some(r)) if r.ncols() == u.ncols() => (Change::ReferenceAtInput, y.to_owned(), u - r),
+            (Some(d), None) if d.ncols() == y.ncols() => (Change::ExcitationAtReference, y - d, u.to_owned()),
+            _ => return Ok(None),
+        };
+        Ok(Some((change, self.residual(k, &e, &w)?)))
     }
 
     /// Share of `u - K e` that the excitation explains, a few samples early or late, in the input where it is least.

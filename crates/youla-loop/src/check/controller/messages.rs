@@ -53,6 +53,9 @@ impl Change {
             Change::Saturation([low, high]) => format!("the input limited to {} ... {}", few(*low), few(*high)),
             Change::WithoutExcitation => "the excitation removed: the input was logged before it was added".into(),
             Change::ExcitationSign => "the opposite sign of the excitation".into(),
+            Change::ReferenceAtInput => "the reference added at the input: declare it as input_excitation".into(),
+            Change::ExcitationAtReference => "the excitation added at the output: declare it as reference".into(),
+            Change::Reading(words) => words.clone(),
         }
     }
 
@@ -72,6 +75,9 @@ impl Change {
             Change::Saturation([_, high]) => ("saturation", *high),
             Change::WithoutExcitation => ("without_excitation", 1.0),
             Change::ExcitationSign => ("excitation_sign", -1.0),
+            Change::ReferenceAtInput => ("reference_at_input", 1.0),
+            Change::ExcitationAtReference => ("excitation_at_reference", 1.0),
+            Change::Reading(_) => ("reading", 1.0),
         }
     }
 }
@@ -117,6 +123,10 @@ impl ControllerCheck {
             );
         }
         let (severity, what) = match (&self.change, self.excited) {
+            _ if self.residual.is_infinite() => (
+                Severity::Defect,
+                "the declared controller is not the one that ran: by itself it is unstable".to_owned(),
+            ),
             (None, false) => (
                 Severity::Note,
                 format!(
@@ -149,7 +159,10 @@ impl ControllerCheck {
         };
         let own_path = self.change.is_none() && self.guided;
         let advice = if own_path { format!("{advice}. {PATH}") } else { advice };
-        let mut finding = Finding::new(Test::Controller, severity, record, what).number("residual", self.residual);
+        let mut finding = Finding::new(Test::Controller, severity, record, what);
+        if self.residual.is_finite() {
+            finding = finding.number("residual", self.residual);
+        }
         if let Some((change, left)) = &self.change {
             let (key, value) = change.number();
             finding = finding.number("residual_after", *left).number(key, value);

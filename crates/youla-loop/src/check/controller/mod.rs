@@ -8,6 +8,7 @@
 //! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel of e
 //! by least squares, two channels or inputs and outputs exchanged, the input limited to its own range, d left out or with the other sign. A change
 //! is proposed where it brings the residual below a tenth of what it was and below `controller_caution` twice over, or to nearly nothing.
+//! Then other readings of the numbers of the controller are tried ([`Reading`]): another rule of discretisation, another form, another clock.
 //! Where none is, the law is compared part by part ([`Parts`]): a controller that was switched or is scheduled.
 //! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
 
@@ -53,12 +54,42 @@ pub enum Change {
     WithoutExcitation,
     /// The excitation with the other sign.
     ExcitationSign,
+    /// The reference was added at the input.
+    ReferenceAtInput,
+    /// The excitation was added at the reference.
+    ExcitationAtReference,
+    /// Another reading of the numbers of the controller, in words.
+    Reading(String),
+}
+
+/// Another controller that the stated numbers may mean.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// What is read otherwise, behind "with".
+    pub words: String,
+    /// The controller, positive feedback.
+    pub controller: StateSpace<Discrete>,
+}
+
+/// A controller as it is stated.
+#[derive(Debug, Clone, Copy)]
+pub struct Declared<'a> {
+    /// The controller, positive feedback.
+    pub controller: &'a StateSpace<Discrete>,
+    /// What its numbers may mean beside it.
+    pub readings: &'a [Reading],
+}
+
+impl<'a> From<&'a StateSpace<Discrete>> for Declared<'a> {
+    fn from(controller: &'a StateSpace<Discrete>) -> Self {
+        Declared { controller, readings: &[] }
+    }
 }
 
 /// How far the declared controller explains the logged input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerCheck {
-    /// Relative residual.
+    /// Relative residual; infinite for a controller that diverges where a reading of its numbers does not.
     pub residual: f64,
     /// Whether an excitation at the plant input is declared.
     pub excited: bool,
@@ -113,19 +144,22 @@ const HELPS: f64 = 0.1;
 /// assert_eq!(found.change.unwrap().0, Change::Sign);
 /// # Ok::<(), youla_loop::Error>(())
 /// ```
-pub fn controller(
-    k: &StateSpace<Discrete>,
+pub fn controller<'a>(
+    declared: impl Into<Declared<'a>>,
     record: ControllerRecord<'_>,
     options: &CheckOptions,
 ) -> Result<ControllerCheck> {
-    if k.worst_pole()?.is_some_and(|pole| pole.norm() > INTEGRATOR) {
-        k.require_stable("the declared controller, to be simulated by itself")?;
-    }
+    let Declared { controller: k, readings } = declared.into();
     let log = Log::new(record);
-    let residual = log.residual(k, &log.e, &log.w)?;
     let excited = record.input_excitation.is_some();
     let moves = |r: MatRef<'_, f64>| r.col_iter().any(|c| c.iter().any(|v| *v != c[0]));
     let guided = record.reference.is_some_and(moves);
+    let other = |residual: f64| reading(readings, &log, residual.min(1.0), options);
+    if let Err(error) = simulated(k) {
+        let change = Some(other(f64::INFINITY).ok_or(error)?);
+        return Ok(ControllerCheck { residual: f64::INFINITY, excited, guided, contained: None, change, parts: None });
+    }
+    let residual = log.residual(k, &log.e, &log.w)?;
     let mut change = None;
     if residual > options.controller_caution {
         for (candidate, left) in log.changes(k)? {
@@ -136,6 +170,8 @@ pub fn controller(
         }
         let least = HELPS * residual;
         change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
+        let told = change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
+        change = if told { change } else { other(residual).or(change) };
     }
     // A change that leaves more than a caution may only resemble what happened: a law that explains every part goes before it.
     let told = change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
@@ -149,6 +185,25 @@ pub fn controller(
         None
     };
     Ok(ControllerCheck { residual, excited, guided, contained, change, parts })
+}
+
+/// Refuses a controller that is unstable by itself.
+fn simulated(k: &StateSpace<Discrete>) -> Result<()> {
+    if k.worst_pole()?.is_some_and(|pole| pole.norm() > INTEGRATOR) {
+        k.require_stable("the declared controller, to be simulated by itself")?;
+    }
+    Ok(())
+}
+
+/// The reading that explains the input, with what it leaves.
+fn reading(readings: &[Reading], log: &Log<'_>, residual: f64, options: &CheckOptions) -> Option<(Change, f64)> {
+    let of = |reading: &Reading| {
+        simulated(&reading.controller).ok()?;
+        let left = log.residual(&reading.controller, &log.e, &log.w).ok()?;
+        Some((Change::Reading(reading.words.clone()), left))
+    };
+    let best = readings.iter().filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (best.1 < HELPS * residual && best.1 <= options.controller_caution).then_some(best)
 }
 
 impl ControllerCheck {

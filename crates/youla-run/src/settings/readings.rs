@@ -1,0 +1,131 @@
+//! What the numbers of a controller may mean beside what is stated. A log that contradicts the stated controller may agree with one of these.
+
+use super::controller::{ControllerSettings, Hold};
+use super::models::Polynomials;
+use super::pid::{IdealPid, LoopGain, ParallelPid};
+use std::path::Path;
+use youla::lti::{Discrete, StateSpace};
+use youla_loop::check::Reading;
+use youla_loop::redesign::structured::Discretisation;
+
+/// The true sample time over the stated one, where times were written in another unit.
+const CLOCKS: [(f64, &str); 3] = [
+    (1e-3, "the time of the log is in milliseconds"),
+    (1e-6, "the time of the log is in microseconds"),
+    (1e3, "the stated one is a thousandth of it"),
+];
+
+impl ControllerSettings {
+    /// Other controllers with the same numbers, positive feedback.
+    pub(crate) fn readings(
+        &self,
+        time: Discrete,
+        nominal: Option<&StateSpace<Discrete>>,
+        folder: &Path,
+    ) -> Vec<Reading> {
+        let of = |settings: &ControllerSettings, ts: f64| {
+            let read = settings.realise(Discrete::new(ts).ok()?, nominal, folder).ok()?;
+            let k = read.system();
+            let [a, b, c, d] = [k.a(), k.b(), k.c(), k.d()].map(|m| m.to_owned());
+            StateSpace::new(a, b, c, d, time).ok()
+        };
+        let of_form = |(words, settings): (String, ControllerSettings)| {
+            Some(Reading { words, controller: of(&settings, time.ts())? })
+        };
+        let mut all: Vec<Reading> = self.forms().into_iter().filter_map(of_form).collect();
+        if self.depends_on_time() {
+            let ts = time.ts();
+            let rate = (1.0 / (ts * ts), "the sample rate was stated as the sample time");
+            for (factor, why) in CLOCKS.into_iter().chain([rate]) {
+                let words = format!("a sample time of {} s: {why}", ts * factor);
+                all.extend(of(self, ts * factor).map(|controller| Reading { words, controller }));
+            }
+        }
+        all
+    }
+
+    /// Whether it is stated with times or in s.
+    fn depends_on_time(&self) -> bool {
+        match self {
+            Self::Pid(_) | Self::IdealPid(_) | Self::Cascade(_) => true,
+            Self::TransferFunction { hold, .. } | Self::StateSpace { hold, .. } => hold.is_some(),
+            Self::DifferenceEquation { .. } | Self::ModelFile { .. } | Self::Observer { .. } => false,
+        }
+    }
+
+    /// The same numbers under another rule, in another form or in the opposite order.
+    fn forms(&self) -> Vec<(String, ControllerSettings)> {
+        match self {
+            Self::Pid(pid) => {
+                let ideal = IdealPid {
+                    feedback: pid.feedback,
+                    discretisation: pid.discretisation,
+                    kp: pid.kp.clone(),
+                    ti: Some(pid.ki.clone()),
+                    td: pid.kd.clone(),
+                    derivative_filter: pid.derivative_filter.clone(),
+                    delay: pid.delay,
+                };
+                let (words, other) = other_rule(pid.discretisation);
+                let ruled = ParallelPid { discretisation: other, ..pid.clone() };
+                let form = "[controller.ideal_pid], ki as ti and kd as td".to_owned();
+                vec![(words, Self::Pid(ruled)), (form, Self::IdealPid(ideal))]
+            }
+            Self::IdealPid(pid) => {
+                let parallel = ParallelPid {
+                    feedback: pid.feedback,
+                    discretisation: pid.discretisation,
+                    kp: pid.kp.clone(),
+                    ki: pid.ti.clone().unwrap_or(LoopGain::One(0.0)),
+                    kd: pid.td.clone(),
+                    derivative_filter: pid.derivative_filter.clone(),
+                    delay: pid.delay,
+                };
+                let (words, other) = other_rule(pid.discretisation);
+                let ruled = IdealPid { discretisation: other, ..pid.clone() };
+                let form = "[controller.pid], ti as ki and td as kd".to_owned();
+                vec![(words, Self::IdealPid(ruled)), (form, Self::Pid(parallel))]
+            }
+            Self::DifferenceEquation { feedback, numerator, denominator, delay, .. } => {
+                let [numerator, denominator] = [numerator, denominator].map(reversed);
+                let (feedback, delay, reference_numerator) = (*feedback, *delay, None);
+                let turned = Self::DifferenceEquation { feedback, numerator, denominator, delay, reference_numerator };
+                vec![("the coefficients in the opposite order, that of z^-1 ascending".to_owned(), turned)]
+            }
+            Self::TransferFunction { hold: None, feedback, domain, numerator, denominator, delay } => {
+                let [numerator, denominator] = [numerator, denominator].map(reversed);
+                let (feedback, domain, delay, hold) = (*feedback, *domain, *delay, None);
+                let turned = Self::TransferFunction { feedback, domain, hold, numerator, denominator, delay };
+                vec![("the coefficients in the opposite order, that of z descending".to_owned(), turned)]
+            }
+            Self::TransferFunction { hold: Some(stated), .. } | Self::StateSpace { hold: Some(stated), .. } => {
+                let (other, name) = match stated {
+                    Hold::Zoh => (Hold::Tustin, "tustin"),
+                    Hold::Tustin => (Hold::Zoh, "zoh"),
+                };
+                let mut held = self.clone();
+                if let Self::TransferFunction { hold, .. } | Self::StateSpace { hold, .. } = &mut held {
+                    *hold = Some(other);
+                }
+                vec![(format!("hold = \"{name}\""), held)]
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+fn other_rule(stated: Discretisation) -> (String, Discretisation) {
+    let (other, name) = match stated {
+        Discretisation::Tustin => (Discretisation::BackwardEuler, "backward-euler"),
+        Discretisation::BackwardEuler => (Discretisation::Tustin, "tustin"),
+    };
+    (format!("discretisation = \"{name}\""), other)
+}
+
+fn reversed(polynomials: &Polynomials) -> Polynomials {
+    let turned = |c: &Vec<f64>| c.iter().rev().copied().collect();
+    match polynomials {
+        Polynomials::Single(c) => Polynomials::Single(turned(c)),
+        Polynomials::Matrix(m) => Polynomials::Matrix(m.iter().map(|row| row.iter().map(turned).collect()).collect()),
+    }
+}

@@ -4,7 +4,7 @@ use crate::output::{Failure, Form};
 use clap::Args;
 use std::path::PathBuf;
 use youla_io::export::{ModelFormat, PidForm, c_controller, c_loop, export_model, export_pid, write_export};
-use youla_run::{controller_for_export, loop_for_export, model_for_export, pid_for_export};
+use youla_run::{caution_for_export, controller_for_export, loop_for_export, model_for_export, pid_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -124,7 +124,12 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
     write_export(&path, &bytes, args.force)?;
     let file = path.display().to_string();
     about["file"] = file.as_str().into();
-    form.print(|| about, || file)
+    let caution = caution_for_export(&args.source, matches!(args.to, Format::Pid(_)));
+    if caution.is_empty() {
+        return form.print(|| about, || file);
+    }
+    about["caution"] = caution.as_str().into();
+    form.print(|| about, || format!("{file}\ncaution: {caution}"))
 }
 
 /// The name of a model may come from a file: only letters, digits, `-` and `_` of it.

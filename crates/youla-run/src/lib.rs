@@ -28,7 +28,9 @@ pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use error::no_model::NoModel;
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
-pub use finished::export::{controller_for_export, loop_for_export, model_for_export, pid_for_export};
+pub use finished::export::{
+    caution_for_export, controller_for_export, loop_for_export, model_for_export, pid_for_export,
+};
 pub use finished::plot::{Plot, plot, plottable, write_plots};
 pub use finished::redraw::redraw;
 pub use folder::artefacts::{ModelFile, Provenance, SCHEMA};

@@ -3,6 +3,8 @@
 use crate::folder::artefacts::{Provenance, SCHEMA};
 use crate::records::SourceFile;
 use crate::settings::RunSettings;
+use crate::summary::Summary;
+use crate::summary::entries::Refused;
 use crate::summary::pid::PidEntry;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -99,14 +101,7 @@ pub fn loop_for_export(source: &Path) -> Result<LoopExport> {
 pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
     require_run(run)?;
     let path = run.join("8-redesign/pid.json");
-    if !path.is_file() {
-        return Err(not(
-            run,
-            "this run has no new PID; add structure = \"pid\" to [redesign] and run `youla identify` again",
-        ));
-    }
-    let found: PidEntry = serde_json::from_str(&youla_io::read_text(&path)?)
-        .map_err(|source| Error::NotASummary { path: path.clone(), source })?;
+    let found = new_pid(run)?;
     let model = read_model(run.join("8-redesign/new_controller.json"))?;
     let loops = found.controllers.len();
     let place = match of_loop {
@@ -135,6 +130,34 @@ pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
         reference_filter: found.steps.last().and_then(|s| s.reference_filters.get(place)).copied().unwrap_or(0.0),
         origin: origin(run, &path)?,
     })
+}
+
+/// The new PID of a run as `8-redesign/pid.json` states it.
+fn new_pid(run: &Path) -> Result<PidEntry> {
+    let path = run.join("8-redesign/pid.json");
+    if !path.is_file() {
+        let problem = "this run has no new PID; add structure = \"pid\" to [redesign] and run `youla identify` again";
+        return Err(not(run, problem));
+    }
+    let text = youla_io::read_text(&path)?;
+    if let Ok(Refused { refused }) = serde_json::from_str(&text) {
+        return Err(not(run, &format!("this run found no new PID: {refused}")));
+    }
+    serde_json::from_str(&text).map_err(|source| Error::NotASummary { path, source })
+}
+
+/// What a run says against what is exported of it, its recommended model or its new PID; empty where it says nothing, and for what is no run.
+pub fn caution_for_export(source: &Path, pid: bool) -> String {
+    let Ok(summary) = Summary::read(source) else { return String::new() };
+    let mut all = Vec::new();
+    if summary.recommended.is_some_and(|model| !model.trusted) {
+        all.push("the recommended model of this run is not trusted".to_owned());
+    }
+    let reservations = if pid { new_pid(source).map_or(Vec::new(), |found| found.reservations) } else { Vec::new() };
+    if !reservations.is_empty() {
+        all.push(format!("do not take this controller as it is: {}", reservations.join("; ")));
+    }
+    all.join("; ")
 }
 
 fn loop_of_run(run: &Path) -> Result<LoopExport> {
@@ -208,8 +231,15 @@ fn not(path: &Path, problem: &str) -> Error {
     Error::File(youla_io::Error::NotAModel { path: path.to_owned(), problem: problem.to_owned() })
 }
 
-/// The file from the run folder on, or its name, with the first digits of its SHA-256.
+/// [`file_of`], with what the run says against it.
 fn origin(source: &Path, path: &Path) -> Result<String> {
+    let from = file_of(source, path)?;
+    let caution = caution_for_export(source, path.ends_with("pid.json"));
+    Ok(if caution.is_empty() { from } else { format!("{from}. CAUTION: {caution}") })
+}
+
+/// The file from the run folder on, or its name, with the first digits of its SHA-256.
+fn file_of(source: &Path, path: &Path) -> Result<String> {
     let from = source.parent().filter(|_| source != path);
     let shown = match from {
         Some(parent) => path.strip_prefix(parent).unwrap_or(path).display().to_string(),

@@ -6,7 +6,8 @@ use clap::Args;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use youla::error::short;
-use youla_io::{ChannelRef, SurveyedColumn, survey};
+use youla::lti::Discrete;
+use youla_io::{ChannelRef, SurveyedColumn, require_free, survey};
 use youla_run::{Draft, DraftClock, Feedback, path_from};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -31,7 +32,7 @@ pub(crate) struct InitArgs {
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time")]
     time: Option<ChannelRef>,
     /// Sample time in seconds.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     sample_time: Option<f64>,
     /// Known excitation added at the plant input, one column per input.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
@@ -63,9 +64,7 @@ pub(crate) struct InitArgs {
 
 /// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
 pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
-    if args.out.exists() && !args.force {
-        return Err(youla_io::Error::FileExists { path: args.out.clone() }.into());
-    }
+    require_free(&args.out, args.force, &[&args.log])?;
     let csv = args.dialect.options();
     let columns = survey(&args.log, &csv)?;
     let missing = missing(args);
@@ -115,8 +114,11 @@ fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failur
     let inputs = list(&args.input, "Inputs of the plant, as applied, separated by commas")?;
     let outputs = list(&args.output, "Outputs of the plant, separated by commas")?;
     let clock = match (&args.time, args.sample_time) {
-        (Some(column), _) => DraftClock::Column(column.clone()),
-        (None, Some(ts)) => DraftClock::SampleTime(ts),
+        (Some(column), _) => {
+            require_clock(args, columns, column)?;
+            DraftClock::Column(column.clone())
+        }
+        (None, Some(ts)) => DraftClock::SampleTime(Discrete::new(ts)?.ts()),
         (None, None) => ask("Column with the time in seconds, or the sample time in seconds", |text| {
             Ok(match text.parse() {
                 Ok(ts) => DraftClock::SampleTime(ts),
@@ -164,6 +166,16 @@ fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failur
         feedback,
         estimated: args.estimate.unwrap_or(2 * rows / 3),
     })
+}
+
+/// Refuses a time column of which the log says that it does not rise.
+fn require_clock(args: &InitArgs, columns: &[SurveyedColumn], chosen: &ChannelRef) -> Result<(), Failure> {
+    let falls = |c: &&SurveyedColumn| c.content.as_ref().is_ok_and(|found| !found.rises);
+    let Some(wrong) = columns.iter().find(|c| c.from == chosen.to_string()).filter(falls) else { return Ok(()) };
+    let even = |c: &&SurveyedColumn| c.content.as_ref().is_ok_and(|found| found.step.is_some_and(|step| step > 0.0));
+    let clock = columns.iter().find(even).map_or(String::new(), |c| format!("; is it {}?", c.from));
+    let problem = format!("the column {} does not rise from row to row, so it is no time{clock}", wrong.from);
+    Err(youla_io::Error::Settings { path: args.log.clone(), at: None, problem }.into())
 }
 
 /// Asks until the answer can be read.

@@ -46,7 +46,7 @@ pub enum Error {
         partial: PathBuf,
     },
     /// The output folder is not a run that may be replaced.
-    #[error("{} is not replaced: {problem}; choose another output folder, or move what is there", path.display())]
+    #[error("{} is not replaced: {problem}; choose another place, or move what is there", path.display())]
     NotReplaced {
         /// The folder.
         path: PathBuf,
@@ -204,6 +204,14 @@ pub enum Error {
         /// The sample time in seconds.
         ts: f64,
     },
+    /// The time column does not rise.
+    #[error("{what}: the time does not rise from row to row: {problem}")]
+    NotRising {
+        /// The record or file.
+        what: String,
+        /// How the rows lie, and what to do.
+        problem: String,
+    },
     /// The name of the time column, or a line of units, states another unit than the second.
     #[error(
         "{what}: the time column {:?} is in {unit} by its {by}, but times are read in seconds; leave it out and state the sample time in seconds (sample_time in [data], --sample-time), or make seconds of it: time_column = \"seconds\" and, in [data.computed], seconds = \"'{}' {to_seconds}\"",
@@ -245,7 +253,7 @@ youla::error_context! {
     numerical: Json;
     bad_input: Settings OutputExists BeingWritten NotReplaced Unwritable FileExists NotAModel NotAResponse Io MissingFile NoData Cell FieldCount
         Delimiter Corrupt
-        FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit Clock SampleTimeMissing;
+        FormatNotRead UnequalLength WrongVariable NonUniformTime NotRising TimeUnit Clock SampleTimeMissing;
 }
 
 /// Where a damaged file was found to be damaged.

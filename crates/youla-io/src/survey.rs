@@ -35,6 +35,8 @@ pub struct ColumnContent {
     pub high: f64,
     /// Mean step where each number exceeds the one before by the same amount, to 1e-3 of it: what a clock does.
     pub step: Option<f64>,
+    /// Whether most numbers exceed the one before.
+    pub rises: bool,
 }
 
 /// Lists the columns of a file; `csv` says how a text file is to be read.
@@ -106,7 +108,11 @@ fn column(from: String, values: &[f64]) -> SurveyedColumn {
     }
     let (low, high) =
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-    SurveyedColumn { from, content: Ok(ColumnContent { rows: values.len(), low, high, step: uniform_step(values) }) }
+    let rises = 2 * values.windows(2).filter(|two| two[1] > two[0]).count() + 1 >= values.len();
+    SurveyedColumn {
+        from,
+        content: Ok(ColumnContent { rows: values.len(), low, high, step: uniform_step(values), rises }),
+    }
 }
 
 fn uniform_step(values: &[f64]) -> Option<f64> {
@@ -132,7 +138,7 @@ mod tests {
         let clock = columns[0].content.as_ref().unwrap();
         assert!((clock.step.unwrap() - 0.1).abs() < 1e-15);
         assert!(columns[1].content.as_ref().unwrap_err().contains("line 2"), "{:?}", columns[1]);
-        assert_eq!(columns[2].content, Ok(ColumnContent { rows: 3, low: -4.0, high: 5.0, step: None }));
+        assert_eq!(columns[2].content, Ok(ColumnContent { rows: 3, low: -4.0, high: 5.0, step: None, rises: true }));
     }
 
     #[test]

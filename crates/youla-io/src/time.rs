@@ -4,6 +4,7 @@ use crate::assemble::assemble;
 use crate::choose::ChannelRef;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
+use youla::error::Seconds;
 use youla::lti::Discrete;
 
 /// Where the sample time comes from; one of `column` and `ts` at least.
@@ -142,6 +143,7 @@ impl TimeSource {
 
     fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
         let middle = median_step(times);
+        require_rising(what, times, middle)?;
         if let Some(ts) = declared {
             let time = Discrete::new(ts)?;
             if (middle - ts).abs() > self.tolerance * ts {
@@ -176,6 +178,22 @@ impl TimeSource {
         }
         Ok(parts)
     }
+}
+
+/// Refuses stamps of which most repeat, because they lack digits, or fall.
+fn require_rising(what: &str, times: &[f64], middle: f64) -> Result<()> {
+    let mean = mean_step(times[0], times[times.len() - 1], times.len());
+    let problem = match middle {
+        rising if rising > 0.0 => return Ok(()),
+        0.0 if mean > 0.0 => format!(
+            "several rows share each stamp, which lacks digits; state the sample time in place of the time column (sample_time in [data], \
+             --sample-time), the mean step is {} s",
+            Seconds(mean)
+        ),
+        falling if falling < 0.0 && mean < 0.0 => "the newest row comes first; sort the rows".to_owned(),
+        _ => "this column is no clock; name the one with the time".to_owned(),
+    };
+    Err(Error::NotRising { what: what.to_owned(), problem })
 }
 
 /// Sample time, and first row (from 0) and time of each part without gaps.

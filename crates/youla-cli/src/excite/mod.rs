@@ -36,7 +36,7 @@ pub(crate) struct ExciteArgs {
         required = true,
         value_delimiter = ',',
         num_args = 1,
-        allow_negative_numbers = true
+        allow_hyphen_values = true
     )]
     band: Vec<f64>,
     /// Length in seconds.

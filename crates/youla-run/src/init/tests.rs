@@ -5,7 +5,7 @@ use crate::RunSettings;
 use youla_io::ColumnContent;
 
 fn columns() -> Vec<SurveyedColumn> {
-    let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
+    let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None, rises: false };
     let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
     let mut all = ["t", "Data.signals.u", "Data.signals.y", "d", "odd \"name\""].map(of).to_vec();
     all.push(SurveyedColumn { from: "mode".into(), content: Err("line 2: not a number".into()) });
@@ -66,7 +66,7 @@ fn several_channels_and_columns_by_number() {
 /// Columns of the matrices of a MATLAB file, chosen by number.
 #[test]
 fn columns_of_matrices_have_places() {
-    let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
+    let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None, rises: false };
     let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
     let columns = ["u(:,1)", "u(:,2)", "y"].map(of);
     let mut numbered = draft(None);

@@ -21,9 +21,24 @@ pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path, at: &str
     let problem = match toml::from_str::<toml::Table>(text) {
         Ok(_) => sentence(&message, &place),
         Err(_) if message == "duplicate key" => format!("the key `{}` is given twice", place.found),
-        Err(_) => format!("this is not TOML: {message}"),
+        Err(_) => format!("this is not TOML: {message}{}", remedy(text, start)),
     };
     problem_at(path, text, start, problem)
+}
+
+/// What the line shows that the parser does not name.
+fn remedy(text: &str, start: usize) -> &'static str {
+    let from = text[..start].rfind('\n').map_or(0, |i| i + 1);
+    let line = text[from..].lines().next().unwrap_or_default();
+    let value = line.split_once('=').map_or("", |(_, value)| value.trim());
+    let comma =
+        value.split_once(',').is_some_and(|(whole, part)| whole.parse::<i64>().is_ok() && part.parse::<u64>().is_ok());
+    match line {
+        _ if line.contains(['\u{201c}', '\u{201d}', '\u{201e}']) => "; these quotes are typographic, write \"",
+        _ if comma => "; write a decimal point in place of the comma",
+        _ if value.starts_with('"') && value.contains('\\') => "; write / in a path, or put it in single quotes",
+        _ => "",
+    }
 }
 
 /// An error at a position of the text, line and column counted from 1 in characters.

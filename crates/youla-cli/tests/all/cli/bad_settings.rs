@@ -104,10 +104,13 @@ fn wrong_types() {
 
 #[test]
 fn text_that_is_not_toml() {
-    let cases: [(&str, &str, &[&str]); 4] = [
+    let cases: [(&str, &str, &[&str]); 7] = [
         ("[data]", "[data", &["run.toml:3:6:", "this is not TOML", "expected `]`"]),
         ("time_column = \"t\"", "time_column = \"t", &["run.toml:4:17:", "this is not TOML"]),
         ("time_column = \"t\"", "time_column = t", &["run.toml:4:15:", "this is not TOML"]),
+        ("time_column = \"t\"", "time_column = \u{201c}t\u{201d}", &["run.toml:4:15:", "typographic"]),
+        ("time_column = \"t\"", "sample_time = 0,001", &["run.toml:4:", "decimal point"]),
+        ("time_column = \"t\"", "time_column = \"C:\\logs\"", &["run.toml:4:", "write / in a path"]),
         ("domain = \"discrete\"", "domain = \"discrete\"\ndomain = \"discrete\"", &["`domain` is given twice"]),
     ];
     for (passage, replacement, evidence) in cases {

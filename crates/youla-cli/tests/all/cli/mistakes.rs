@@ -151,11 +151,58 @@ const LOGS: [Mistake; 7] = [
     ),
 ];
 
-const CALLS: [Mistake; 15] = [
+const CALLS: [Mistake; 19] = [
     called("a log for a run.toml", &["check", "log.csv"], &["log.csv", "--input", "--output", "youla init"]),
     called("the same to identify", &["identify", "log.csv"], &["log.csv", "--input", "--sample-time", "youla init"]),
     called("the same to signals", &["signals", "log.csv"], &["log.csv: this is no run.toml", "youla init"]),
     called("no clock", &["check", "log.csv", "--input", "u", "--output", "y"], &["log.csv", "--sample-time", "--time"]),
+    called(
+        "a clock that does not rise",
+        &["init", "log.csv", "--input", "u", "--output", "y", "--time", "u", "--open-loop", "--out", "new.toml"],
+        &["the column u does not rise from row to row", "is it t?"],
+    ),
+    called(
+        "settings over the log",
+        &[
+            "init",
+            "log.csv",
+            "--input",
+            "u",
+            "--output",
+            "y",
+            "--time",
+            "t",
+            "--open-loop",
+            "--out",
+            "log.csv",
+            "--force",
+        ],
+        &["log.csv is not replaced: the data are read from it"],
+    ),
+    called(
+        "a log on one clock over itself",
+        &[
+            "synchronise",
+            "log.csv",
+            "--time",
+            "t",
+            "--input",
+            "u",
+            "--output",
+            "y",
+            "--sample-time",
+            "0.01",
+            "--out",
+            "log.csv",
+            "--force",
+        ],
+        &["log.csv is not replaced: the data are read from it"],
+    ),
+    called(
+        "a folder for a model",
+        &["export", "g.json", "--to", "python", "--out", "mine", "--force"],
+        &["mine", "a folder"],
+    ),
     called("inputs alone", &["check", "log.csv", "--input", "u"], &["--output <NAME>"]),
     called(
         "no controller",
@@ -210,7 +257,7 @@ const CALLS: [Mistake; 15] = [
     called(
         "the same with --force",
         &["identify", "run.toml", "--out", "mine", "--force"],
-        &["mine is not replaced", "choose another output folder"],
+        &["mine is not replaced", "choose another place"],
     ),
     called(
         "a folder below a file",

@@ -102,8 +102,10 @@ impl PidOptions {
         let keys: [Key<'_>; 6] = [
             ("notches", self.notches as f64, "at most 4", &few),
             ("peak_sensitivity", self.peak_sensitivity, "above 1", &above),
-            ("gain_margin", self.gain_margin, "at least 1", &at_least(1.0)),
-            ("phase_margin", self.phase_margin, "from 0 to 90 degrees", &|v| (0.0..=90.0).contains(&v)),
+            ("gain_margin", self.gain_margin, "a factor from 1 to 5 (6 dB are 2)", &|v| (1.0..=5.0).contains(&v)),
+            ("phase_margin", self.phase_margin, "0 for none, or from 5 to 90 degrees", &|v| {
+                v == 0.0 || (5.0..=90.0).contains(&v)
+            }),
             ("delay_margin", self.delay_margin, "zero or a time in seconds", &at_least(0.0)),
             ("command_effort", self.command_effort, "positive", &|v| v > 0.0 && v.is_finite()),
         ];

@@ -158,8 +158,8 @@ const CALLS: [Mistake; 19] = [
     called("no clock", &["check", "log.csv", "--input", "u", "--output", "y"], &["log.csv", "--sample-time", "--time"]),
     called(
         "a clock that does not rise",
-        &["init", "log.csv", "--input", "u", "--output", "y", "--time", "u", "--open-loop", "--out", "new.toml"],
-        &["the column u does not rise from row to row", "is it t?"],
+        &["init", "log.csv", "--input", "u", "--output", "t", "--time", "y", "--open-loop", "--out", "new.toml"],
+        &["the column y does not rise from row to row", "is it t?"],
     ),
     called(
         "settings over the log",

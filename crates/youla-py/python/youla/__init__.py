@@ -8,30 +8,21 @@
 
 from . import _native
 from ._channels import Channels, ChannelTiming, Synchronised
+from ._compare import Comparison, compare
 from ._errors import Error, InputError, NumericalError
 from ._figures import Plots
 from ._identify import demo, identify
-from ._loop import (
-    Certificate,
-    Comparison,
-    Excitation,
-    Redesign,
-    Reduction,
-    certify,
-    compare,
-    excite,
-    redesign,
-    reduce,
-    simulate_loop,
-)
+from ._loop import Certificate, Excitation, Reduction, certify, excite, reduce, simulate_loop
 from ._model import FrequencyResponse, Mode, Model, RealPole
 from ._plan import Study, study
 from ._record import Record
+from ._redesign import Redesign, redesign
 from ._response import Response
-from ._result import Evidence, Prediction, Run, Verdict, VerdictTest, load
+from ._result import Run, load
 from ._stages import Check, SubspaceEstimate, check, greybox, subspace
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
+from ._verdict import Evidence, Prediction, Verdict, VerdictTest
 from ._workbench import workbench
 
 __version__ = _native.version()

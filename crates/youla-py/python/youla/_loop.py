@@ -1,10 +1,8 @@
-"""What belongs to a loop: certificate, simulation, reduction, a new controller, an excitation, comparison of runs."""
+"""What belongs to a loop: certificate, simulation, reduction, an excitation."""
 
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,15 +11,11 @@ import numpy as np
 
 from . import _native
 from ._arrays import MOST_NUMBERS, Array, as_floats, positive, whole
-from ._checks import known, listed, path_of, text
+from ._checks import known
 from ._errors import InputError
-from ._figures import RECOMMENDED
 from ._identify import plain
-from ._kept import Kept, again, files_of
 from ._model import Complex, Model, _signal
-from ._result import Run
 from ._systems import as_model, controller_table, nominal_table, sign_of
-from ._types import Matrices
 
 
 #: Further options of `excite`.
@@ -216,85 +210,6 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
 
 
 @dataclass(frozen=True)
-class Redesign:
-    """A new controller ``u = K y`` (positive feedback), and what it promises as ``[redesign]`` reports it."""
-
-    controller: Model
-    promised: dict[str, Any]
-
-    def __repr__(self) -> str:
-        if "proof" in self.promised:
-            named = "; ".join(", ".join(f"{key} {gains[key]:.4g}" for key in ("kp", "ki", "kd")) for gains in self.promised["controllers"])
-            return f"<youla.Redesign: {named}; {'proved' if self.promised['proof']['holds'] else 'NOT proved'} on {self.promised['proof']['models']} models>"
-        loops = [f"{key} {of['least_damping']:.4g}" for key, of in self.promised.items() if isinstance(of, dict) and of.get("least_damping") is not None]
-        return f"<youla.Redesign: controller of order {self.controller.order}; least damping {', '.join(loops) or 'unknown'}>"
-
-
-def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
-    """Design a new controller on the result of a run, or one PID on those of several operating points.
-
-    Parameters
-    ----------
-    run : Run, or sequence of Run
-        A finished run. Several runs, one for each operating point, need ``structure="pid"``: the same controller ran at all of them, and the
-        limits of the new one hold over the regions of all.
-    **options
-        Keys of ``[redesign]`` of run.toml: ``method``, ``input_weights``, ``peak_sensitivity``, ``structure``, ``pid``.
-
-    Returns
-    -------
-    Redesign
-        The new controller, m x p, with positive feedback, and the figures of both loops; of a PID the gains and their proof, of several points
-        that of the worst one.
-
-    Raises
-    ------
-    InputError
-        Where the run has no coprime factors, where runs of several points had other controllers or sample times; of a PID, where
-        the machine is not square or its controller leads an output to the input of another loop.
-    NumericalError
-        Where no tried weight, or no PID, keeps the limits.
-
-    Examples
-    --------
-    >>> import youla
-    >>> new = youla.redesign(youla.demo("bearing"))
-    >>> new.controller.inputs, new.promised["predicted"]["least_damping"] > new.promised["present"]["least_damping"]
-    (('y_h', 'y_v'), True)
-    """
-    runs = [run] if isinstance(run, Run) else listed(run, "run", "runs")
-    for one in runs:
-        if not isinstance(one, Run):
-            raise InputError(f"run is {type(one).__name__}, but must be a youla.Run, as youla.identify returns it, or a list of them")
-    if not runs:
-        raise InputError("run is empty, but must be a youla.Run or a list of them, one for each operating point")
-    first = runs[0]
-    if len(runs) > 1 and options.get("structure") != "pid":
-        raise InputError("of several runs one PID is designed; give structure='pid', or redesign each run by itself")
-    if options.get("structure") is None:
-        promised, (a, b, c, d, dt) = first._native.redesign(plain(options))
-    else:
-        promised, (a, b, c, d, dt) = _pid(runs, options)
-    u, y = ([name for name, _ in channels] for channels in first._native.ports())
-    return Redesign(Model(a, b, c, d, dt=dt, inputs=y, outputs=u, name="new controller"), json.loads(promised))
-
-
-def _pid(runs: Sequence[Run], options: Mapping[str, Any]) -> tuple[str, Matrices]:
-    kept = [Kept(files_of(run._native)) for run in runs]
-    ran = [k.model("controller") for k in kept]
-    for k, other in enumerate(ran[1:], 1):
-        if ran[0] is None or other is None or not _equal(ran[0], other):
-            raise InputError(f"run[{k}] had another controller or sample time than run[0]; one controller is redesigned for points at which it ran")
-    settings, logs, _ = again(kept[0])
-    return _native.redesign_pid(settings, logs, [k.point() for k in kept], plain(options))
-
-
-def _equal(a: Matrices, b: Matrices) -> bool:
-    matrices = zip(a[:4], b[:4], strict=True)
-    return bool(np.isclose(a[4], b[4], rtol=1e-9)) and all(x.shape == y.shape and np.allclose(x, y, rtol=1e-9) for x, y in matrices)
-
-
-@dataclass(frozen=True)
 class Excitation:
     """An excitation: `signal`, samples x inputs, its sample time and what it is predicted to do."""
 
@@ -401,58 +316,3 @@ def _ports(system: Any) -> tuple[int, int]:
     if isinstance(system, Mapping):
         raise InputError("nominal is a mapping, of which the ports are not known; give a youla.Model or a system of python-control")
     return 1, 1
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Names of runs, and the nu-gap of each pair: ``first``, ``second`` and the distance."""
-
-    runs: tuple[str, ...]
-    distances: tuple[dict[str, Any], ...]
-
-    def __repr__(self) -> str:
-        return f"<youla.Comparison: {len(self.runs)} runs, {len(self.distances)} distances; {', '.join(self.runs[:6])}>"
-
-
-def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None) -> Comparison:
-    """Compare one model of several runs of one machine.
-
-    Parameters
-    ----------
-    runs : sequence of Run or of paths of run folders
-        At least two.
-    model : str
-        Name of the model.
-    page : path, optional
-        Where to write the page of the comparison, with its data as JSON beside it.
-
-    Returns
-    -------
-    Comparison
-        Names of the runs and the nu-gap, 0 to 1, of each pair.
-
-    Raises
-    ------
-    InputError
-        For fewer than two runs, or a folder without the model.
-
-    Examples
-    --------
-    >>> import youla
-    >>> found = youla.compare([youla.demo(seed=1), youla.demo(seed=2)])
-    >>> len(found.runs), len(found.distances)
-    (2, 1)
-    """
-    if isinstance(runs, str):
-        raise InputError(f"runs is {runs!r}, but must be a list of at least two youla.Run or run folders")
-    runs = listed(runs, "runs", "at least two youla.Run or run folders")
-    model = text(model, "model")
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [
-            run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
-            for k, run in enumerate(runs)
-        ]
-        # Run folders name the recommended model by its file.
-        model = "recommended" if model == RECOMMENDED else model
-        found = json.loads(_native.compare(paths, model, None if page is None else path_of(page, "page")))
-    return Comparison(tuple(found["runs"]), tuple(found["distances"]))

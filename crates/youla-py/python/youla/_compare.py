@@ -1,0 +1,71 @@
+"""Comparison of runs of one machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from . import _native
+from ._checks import listed, path_of, text
+from ._errors import InputError
+from ._figures import RECOMMENDED
+from ._result import Run
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Names of runs, and the nu-gap of each pair: ``first``, ``second`` and the distance."""
+
+    runs: tuple[str, ...]
+    distances: tuple[dict[str, Any], ...]
+
+    def __repr__(self) -> str:
+        return f"<youla.Comparison: {len(self.runs)} runs, {len(self.distances)} distances; {', '.join(self.runs[:6])}>"
+
+
+def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None) -> Comparison:
+    """Compare one model of several runs of one machine.
+
+    Parameters
+    ----------
+    runs : sequence of Run or of paths of run folders
+        At least two.
+    model : str
+        Name of the model.
+    page : path, optional
+        Where to write the page of the comparison, with its data as JSON beside it.
+
+    Returns
+    -------
+    Comparison
+        Names of the runs and the nu-gap, 0 to 1, of each pair.
+
+    Raises
+    ------
+    InputError
+        For fewer than two runs, or a folder without the model.
+
+    Examples
+    --------
+    >>> import youla
+    >>> found = youla.compare([youla.demo(seed=1), youla.demo(seed=2)])
+    >>> len(found.runs), len(found.distances)
+    (2, 1)
+    """
+    if isinstance(runs, str):
+        raise InputError(f"runs is {runs!r}, but must be a list of at least two youla.Run or run folders")
+    runs = listed(runs, "runs", "at least two youla.Run or run folders")
+    model = text(model, "model")
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [
+            run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
+            for k, run in enumerate(runs)
+        ]
+        # Run folders name the recommended model by its file.
+        model = "recommended" if model == RECOMMENDED else model
+        found = json.loads(_native.compare(paths, model, None if page is None else path_of(page, "page")))
+    return Comparison(tuple(found["runs"]), tuple(found["distances"]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,9 +11,10 @@ import numpy as np
 from . import _native
 from ._arrays import Array, whole
 from ._channels import Channels, Synchronised
-from ._checks import file_of, known, text
+from ._checks import file_of, text
 from ._errors import InputError
 from ._model import FrequencyResponse, _numbered
+from ._options import check_options, plain
 from ._record import Record
 from ._response import Response, data_of
 from ._result import Run
@@ -22,20 +22,6 @@ from ._systems import UnstatedSign, controller_table, nominal_table
 from ._types import Log, Table
 
 Records = Record | Sequence[Record]
-
-#: Tables of run.toml that are keywords.
-OPTIONS = (
-    "recommended", "factors", "hansen", "direct", "reduction", "grey_box", "redesign",
-    "verification", "check", "frequency_response", "data",
-)  # fmt: skip
-
-
-#: Other arguments of the functions that take these keywords, for hints.
-_ARGUMENTS = {
-    "identify": ("nominal", "controller", "feedback", "hold", "verify", "name"),
-    "check": ("nominal", "controller", "feedback", "hold"),
-    "identify_many": ("nominal", "controller", "feedback", "hold", "name", "read", "executor", "folder", "progress"),
-}
 
 
 def identify(
@@ -224,14 +210,6 @@ def _common(a: Record, b: Record) -> str | None:
     return "all samples" if equal else None
 
 
-def check_options(options: Mapping[str, Any], function: str) -> None:
-    """Refuse keywords that are no tables of run.toml."""
-    known(options, [*OPTIONS, *_ARGUMENTS[function]], function)
-    for key, table in options.items():
-        if not isinstance(table, Mapping):
-            raise InputError(f"{key} is {type(table).__name__}, but must be a mapping as the table [{key}] of run.toml")
-
-
 def _check_moves(records: list[Record]) -> None:
     """Refuse an input that never moves: nothing shows what it does."""
     for j, name in enumerate(records[0].inputs):
@@ -274,24 +252,6 @@ def _labels(records: list[Record]) -> list[str]:
     """Names of records, numbered where one is there twice."""
     names = [r.name for r in records]
     return [n if names.count(n) == 1 else f"{n}-{names[: k + 1].count(n)}" for k, n in enumerate(names)]
-
-
-def plain(value: Any, where: str = "an option") -> Any:
-    """Settings as numbers, text, lists and mappings; what is None is absent. `where` is the place of the value, for messages."""
-    if isinstance(value, Mapping):
-        inside = "" if where == "an option" else f"{where}."
-        return {str(key): plain(v, f"{inside}{key}") for key, v in value.items() if v is not None}
-    if isinstance(value, (np.ndarray, np.generic)):
-        value = value.tolist()
-    if isinstance(value, (list, tuple)):
-        return [plain(v, where) for v in value]
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"{where} is {value}, but must be finite; leave it out where it is not known")
-    if isinstance(value, (str, bool, int, float)):
-        return value
-    raise InputError(f"{where} is {value!r}, but options are numbers, text, lists and mappings")
 
 
 def demo(machine: str = "levitation", *, seed: int = 1) -> Run:

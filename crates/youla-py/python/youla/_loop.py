@@ -13,8 +13,8 @@ from . import _native
 from ._arrays import MOST_NUMBERS, Array, as_floats, positive, whole
 from ._checks import known
 from ._errors import InputError
-from ._identify import plain
 from ._model import Complex, Model, _signal
+from ._options import plain
 from ._systems import as_model, controller_table, nominal_table, sign_of
 
 

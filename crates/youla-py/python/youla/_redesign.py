@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._checks import listed
+from ._checks import kind, listed
 from ._errors import InputError
-from ._identify import plain
 from ._kept import Kept, again, files_of
 from ._model import Model
+from ._options import check_redesign, plain
 from ._result import Run
 from ._types import Matrices
 
@@ -43,7 +43,8 @@ def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
         A finished run. Several runs, one for each operating point, need ``structure="pid"``: the same controller ran at all of them, and the
         limits of the new one hold over the regions of all.
     **options
-        Keys of ``[redesign]`` of run.toml: ``method``, ``input_weights``, ``peak_sensitivity``, ``structure``, ``pid``.
+        Either ``method``, ``input_weights`` and ``peak_sensitivity``, or ``structure="pid"`` with its parts and limits as the mapping ``pid``,
+        for example ``pid={"peak_sensitivity": 1.7, "phase_margin": 40}``.
 
     Returns
     -------
@@ -54,7 +55,7 @@ def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
     Raises
     ------
     InputError
-        Where the run has no coprime factors, where runs of several points had other controllers or sample times; of a PID, where
+        For an option that the structure does not use, where the run has no coprime factors, where runs of several points had other controllers or sample times; of a PID, where
         the machine is not square or its controller leads an output to the input of another loop.
     NumericalError
         Where no tried weight, or no PID, keeps the limits.
@@ -66,12 +67,8 @@ def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
     >>> new.controller.inputs, new.promised["predicted"]["least_damping"] > new.promised["present"]["least_damping"]
     (('y_h', 'y_v'), True)
     """
-    runs = [run] if isinstance(run, Run) else listed(run, "run", "runs")
-    for one in runs:
-        if not isinstance(one, Run):
-            raise InputError(f"run is {type(one).__name__}, but must be a youla.Run, as youla.identify returns it, or a list of them")
-    if not runs:
-        raise InputError("run is empty, but must be a youla.Run or a list of them, one for each operating point")
+    runs = _runs(run)
+    check_redesign(options, "redesign")
     first = runs[0]
     if len(runs) > 1 and options.get("structure") != "pid":
         raise InputError("of several runs one PID is designed; give structure='pid', or redesign each run by itself")
@@ -81,6 +78,18 @@ def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
         promised, (a, b, c, d, dt) = _pid(runs, options)
     u, y = ([name for name, _ in channels] for channels in first._native.ports())
     return Redesign(Model(a, b, c, d, dt=dt, inputs=y, outputs=u, name="new controller"), json.loads(promised))
+
+
+def _runs(given: Any) -> list[Run]:
+    """One run or several; a model alone has no region, on which a controller is designed."""
+    runs: list[Any] = [given] if isinstance(given, (Run, Model)) else listed(given, "run", "youla.Run")
+    for one in runs:
+        if not isinstance(one, Run):
+            remedy = "; give the youla.Run that holds this model" if isinstance(one, Model) else ""
+            raise InputError(f"run is {kind(one)}, but must be a youla.Run, as youla.identify returns it, or a list of them{remedy}")
+    if not runs:
+        raise InputError("run is empty, but must be a youla.Run or a list of them, one for each operating point")
+    return runs
 
 
 def _pid(runs: Sequence[Run], options: Mapping[str, Any]) -> tuple[str, Matrices]:

@@ -13,9 +13,10 @@ from . import _native
 from ._arrays import Array
 from ._checks import table
 from ._errors import InputError
-from ._identify import Records, check_options, identify, plain, prepare, records_of
+from ._identify import Records, identify, prepare, records_of
 from ._model import FrequencyResponse, Mode, Model
 from ._optional import need
+from ._options import check_options, plain
 from ._record import Record
 from ._result import Run
 

@@ -18,9 +18,10 @@ from . import _native
 from ._arrays import Array, seeded, whole
 from ._checks import kind, known, share, table
 from ._errors import Error, InputError, NumericalError
-from ._identify import OPTIONS, Records, check_options, plain, prepare
+from ._identify import Records, prepare
 from ._kept import again
 from ._model import Model
+from ._options import OPTIONS, check_options, plain
 from ._record import Record
 from ._result import Run
 from ._systems import check_hold, sign_of

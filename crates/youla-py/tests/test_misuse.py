@@ -1,0 +1,42 @@
+"""Arguments that can be meant, but mean something else: refused with what is meant, never taken silently."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import youla
+
+Call = Callable[[youla.Run], Any]
+
+#: Calls on a run, with what they are told.
+CASES: dict[str, tuple[Call, str]] = {
+    # redesign
+    "limit of another structure": (
+        lambda run: youla.redesign(run, structure="pid", peak_sensitivity=1.1),
+        r"^peak_sensitivity is not used with structure='pid'; give pid=\{'peak_sensitivity': 1.1\}$",
+    ),
+    "method of another structure": (lambda run: youla.redesign(run, structure="pid", method="lqg"), "^method is not used with structure='pid'; leave it out$"),
+    "weights of another structure": (lambda run: youla.redesign(run, structure="pid", input_weights=[1.0]), "^input_weights is not used"),
+    "limits without structure": (lambda run: youla.redesign(run, pid={"peak_sensitivity": 1.5}), "^pid is not used without structure='pid'; give structure='pid' too"),
+    "limit beside pid": (lambda run: youla.redesign(run, structure="pid", phase_margin=40), r"phase_margin is a key of pid; .*pid=\{'phase_margin': 40\}"),
+    "phase margin in radians": (lambda run: youla.redesign(run, structure="pid", pid={"phase_margin": 0.7}), r"pid\['phase_margin'\] is 0.7, but is in degrees: give at least 5"),
+    "misspelt limit": (lambda run: youla.redesign(run, structure="pid", pid={"gain_margn": 3}), "pid has no argument 'gain_margn'; did you mean 'gain_margin'"),
+    "structure": (lambda run: youla.redesign(run, structure="lead-lag"), "structure is 'lead-lag', but must be 'pid'"),
+    "model in place of a run": (lambda run: youla.redesign(run.recommended), "run is a Model, but must be a youla.Run.*give the youla.Run that holds this model"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_misuse_is_refused(case: str, run: youla.Run) -> None:
+    call, says = CASES[case]
+    with pytest.raises(youla.InputError, match=says) as told:
+        call(run)
+    assert "run.toml" not in str(told.value)
+
+
+def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
+    with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
+        youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -40,3 +41,25 @@ def test_a_misuse_is_refused(case: str, run: youla.Run) -> None:
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})
+
+
+def test_a_page_replaces_only_a_page(run: youla.Run, tmp_path: Path) -> None:
+    log, page = tmp_path / "log.csv", tmp_path / "page.html"
+    log.write_text("t,u,y\n")
+    page.write_text("<html>mine</html>")
+    (tmp_path / "data.json").write_text('{"runs": 3}')
+    data = tmp_path / "data.html"
+    for call, says in (
+        (lambda: run.report(log), r"log.csv, but the page is an HTML file; give .*log.html"),
+        (lambda: run.report(page), r"page.html, a file that is there and that youla did not write; give another name, or replace=True"),
+        (lambda: youla.compare([run, run], page=page), "page is .*page.html, a file that is there"),
+        (lambda: youla.compare([run, run], page=data), "whose data go into .*data.json, a file that is there"),
+    ):
+        with pytest.raises(youla.InputError, match=says):
+            call()
+    assert (log.read_text(), page.read_text(), data.exists()) == ("t,u,y\n", "<html>mine</html>", False)
+    run.report(page, replace=True)
+    run.report(page)
+    youla.compare([run, run], page=data, replace=True)
+    youla.compare([run, run], page=data)
+    assert '"distances"' in (tmp_path / "data.json").read_text()

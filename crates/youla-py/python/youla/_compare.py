@@ -13,6 +13,7 @@ from . import _native
 from ._checks import listed, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
+from ._pages import place_of_page
 from ._result import Run
 
 
@@ -27,7 +28,9 @@ class Comparison:
         return f"<youla.Comparison: {len(self.runs)} runs, {len(self.distances)} distances; {', '.join(self.runs[:6])}>"
 
 
-def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None) -> Comparison:
+def compare(
+    runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None, replace: bool = False
+) -> Comparison:
     """Compare one model of several runs of one machine.
 
     Parameters
@@ -37,7 +40,9 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     model : str
         Name of the model.
     page : path, optional
-        Where to write the page of the comparison, with its data as JSON beside it.
+        HTML file of the comparison, with its data in a JSON file beside it. A comparison of that name is replaced.
+    replace : bool
+        Whether to replace any other file of these names as well.
 
     Returns
     -------
@@ -47,7 +52,7 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     Raises
     ------
     InputError
-        For fewer than two runs, or a folder without the model.
+        For fewer than two runs, a folder without the model, and a page in the place of a file that youla did not write.
 
     Examples
     --------
@@ -60,6 +65,7 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
         raise InputError(f"runs is {runs!r}, but must be a list of at least two youla.Run or run folders")
     runs = listed(runs, "runs", "at least two youla.Run or run folders")
     model = text(model, "model")
+    place = None if page is None else place_of_page(page, "page", replace, data_beside=True)
     with tempfile.TemporaryDirectory() as folder:
         paths = [
             run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
@@ -67,5 +73,5 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
         ]
         # Run folders name the recommended model by its file.
         model = "recommended" if model == RECOMMENDED else model
-        found = json.loads(_native.compare(paths, model, None if page is None else path_of(page, "page")))
+        found = json.loads(_native.compare(paths, model, place))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))

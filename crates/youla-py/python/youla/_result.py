@@ -16,6 +16,7 @@ from ._figures import RECOMMENDED, Plots
 from ._kept import Kept, Results, files_of, read_folder
 from ._model import FrequencyResponse, Mode, Model, RealPole, _model_of, frequencies
 from ._optional import need
+from ._pages import place_of_page
 from ._verdict import Evidence, Prediction, Verdict, VerdictTest
 
 
@@ -269,15 +270,22 @@ class Run:
             rows += [{**about, "record": r, "output": o, "fit": f} for r, o, f in fits] or [about]
         return pd.DataFrame(rows)
 
-    def report(self, path: str | os.PathLike[str]) -> None:
+    def report(self, path: str | os.PathLike[str], *, replace: bool = False) -> None:
         """Write the report.
 
         Parameters
         ----------
         path : path
-            HTML file that needs nothing else; a file of that name is replaced.
+            HTML file that needs nothing else. A page of youla of that name is replaced.
+        replace : bool
+            Whether to replace any other file as well.
+
+        Raises
+        ------
+        InputError
+            For a name that does not end in .html, and where a file is there that youla did not write, unless `replace` is true.
         """
-        write_file(path, "path", self._native.html())
+        write_file(place_of_page(path, "path", replace), "path", self._native.html())
 
     def save(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
         """Write the run folder that ``youla identify`` writes.

@@ -23,7 +23,7 @@ from ._result import Run
 
 @dataclass(frozen=True)
 class Check:
-    """Findings of a check of records.
+    """Findings of a check of records; true where there is no defect.
 
     Attributes
     ----------
@@ -42,6 +42,9 @@ class Check:
     def ok(self) -> bool:
         """Whether there is no defect."""
         return self.defects == 0
+
+    def __bool__(self) -> bool:
+        return self.ok
 
     def to_frame(self) -> Any:
         """Return the findings as a pandas data frame."""

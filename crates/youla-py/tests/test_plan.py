@@ -47,6 +47,13 @@ def test_the_cheapest_condition_is_the_shortest_that_suffices(found: youla.Study
     assert found.cheapest(1e-9) is None
 
 
+@pytest.mark.parametrize("part", [5, -0.05, 0, float("nan"), True, "5 %"])
+def test_a_percentage_is_no_part(found: youla.Study, part: Any) -> None:
+    for call in (lambda: found.cheapest(part), lambda: found.plot(wanted=part)):
+        with pytest.raises(youla.InputError, match="is the wanted standard deviation as a part of the damping ratio, above 0 and at most 1; 5 % is 0.05"):
+            call()
+
+
 def test_rows_are_equal_on_every_executor_and_are_kept(found: youla.Study, tmp_path: Path) -> None:
     few = {"n": 2, "noise": 0.05, "seed": 1}
     serial = youla.study(PLANT, 0.1, [SHORT], feedback="negative", **few, folder=tmp_path)

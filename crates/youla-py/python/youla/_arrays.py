@@ -88,15 +88,15 @@ def as_matrix(values: Any, what: str) -> Array:
     return np.atleast_2d(array)
 
 
-def positive(value: Any, what: str) -> float:
-    """Return a positive finite number of seconds."""
+def positive(value: Any, what: str, unit: str = "seconds") -> float:
+    """Return a positive finite number of a unit."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, Decimal)):
-        raise InputError(f"{what} is {value!r}, but must be a positive number of seconds")
+        raise InputError(f"{what} is {value!r}, but must be a positive number of {unit}")
     number = float(value)
     if not (number > 0 and np.isfinite(number)):
-        raise InputError(f"{what} is {number}, but must be a positive number of seconds")
+        raise InputError(f"{what} is {number}, but must be a positive number of {unit}")
     return number
 
 

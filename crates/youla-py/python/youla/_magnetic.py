@@ -69,7 +69,7 @@ class MagneticLoop:
         w = frequencies(2 * np.pi * as_floats(hz, "hz"))
         node = place(node, "node", len(self._shapes), "nodes of the rotor")
         g = self.plant if model is None else as_model(model, "model")
-        force = positive(magnitude, "magnitude") * (w**2)[:, None] * (self._shapes[node].T @ np.array([1.0, -1.0j]))
+        force = positive(magnitude, "magnitude", "kg m") * (w**2)[:, None] * (self._shapes[node].T @ np.array([1.0, -1.0j]))
         stiffness, damping, _, sensors = self._modal
         dynamic = stiffness - (w**2)[:, None, None] * np.eye(len(stiffness)) + 1j * w[:, None, None] * damping
         free = np.linalg.solve(dynamic, force[..., None])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._arrays import Array, as_floats, positive, seeded, whole
+from ._arrays import Array, as_floats, seeded, whole
 from ._checks import known, listed, place, table
 from ._errors import Error, InputError, NumericalError
 from ._loop import EXCITE, certify, excite, simulate_loop
@@ -98,7 +98,7 @@ class Study(Rows):
         Parameters
         ----------
         zeta : float
-            Wanted standard deviation of the damping ratio, as a part of it: 0.05 is 5 %.
+            Wanted standard deviation of the damping ratio, as a part of it, at most 1: 0.05 is 5 %.
         mode : int, optional
             Which mode, from 0 in the order of `modes`; every mode when absent.
 
@@ -111,9 +111,9 @@ class Study(Rows):
         Raises
         ------
         InputError
-            For a plant without oscillating modes, or a mode that it does not have.
+            For a plant without oscillating modes, a mode that it does not have, or a part that is none.
         """
-        wanted = positive(zeta, "zeta")
+        wanted = _part(zeta, "zeta")
         self._zeta(0 if mode is None else mode)
         limits = {k + 1: wanted * self._zeta(k) for k in (range(len(self.modes)) if mode is None else [mode])}
 
@@ -162,7 +162,7 @@ class Study(Rows):
         for label, points in curves.items():
             ax.plot(*zip(*sorted(points), strict=True), marker="o", label=label)
         if wanted is not None:
-            ax.axhline(100 * positive(wanted, "wanted"), color="0.4", linestyle="--", label="wanted")
+            ax.axhline(100 * _part(wanted, "wanted"), color="0.4", linestyle="--", label="wanted")
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.set_xlabel("length of the record, s" if all("seconds" in c for c in self.conditions) else "length of the record")
@@ -175,6 +175,13 @@ class Study(Rows):
         if not self.modes:
             raise InputError("the simulated plant has no oscillating mode, so that there is no damping; read .table() instead")
         return self.modes[place(mode, "mode", len(self.modes), f"the plant has {len(self.modes)} oscillating modes")][1]
+
+
+def _part(value: Any, what: str) -> float:
+    """Return a standard deviation as a part of the damping ratio."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < float(value) <= 1:
+        raise InputError(f"{what} is {value!r}, but is the wanted standard deviation as a part of the damping ratio, above 0 and at most 1; 5 % is 0.05")
+    return float(value)
 
 
 def study(

@@ -113,6 +113,22 @@ def test_an_open_loop_has_no_loop_gain(record: youla.Record, nominal: youla.Mode
         found.plot.nyquist()
 
 
+@pytest.mark.parametrize("model", ["controller", "deviation"])
+def test_only_a_plant_has_a_loop_gain(run: youla.Run, model: str) -> None:
+    assert model in run.models
+    for draw in (run.plot.nyquist, run.plot.loop):
+        with pytest.raises(youla.InputError, match=f"model '{model}' is no plant, .*; choose of likelihood, nominal, hansen"):
+            draw(model)
+
+
+@pytest.mark.parametrize("projection", ["polar", "3d"])
+def test_figures_need_rectangular_axes(run: youla.Run, projection: str) -> None:
+    axes = plt.subplots(2, subplot_kw={"projection": projection})[1]
+    for draw in (lambda: run.plot.nyquist(ax=axes[0]), lambda: run.plot.bode(ax=axes)):
+        with pytest.raises(youla.InputError, match=f"ax has the projection '{projection}', but the figure needs rectangular axes"):
+            draw()
+
+
 def test_a_study_draws_every_mode() -> None:
     c, s = np.cos([0.2, 0.6]), np.sin([0.2, 0.6])
     a = np.zeros((4, 4))

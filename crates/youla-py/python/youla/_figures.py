@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Name of the recommended model among the models of a run.
 RECOMMENDED = "likelihood"
+#: Models of a run from other signals than u to others than y.
+_NO_PLANTS = ("controller", "new_controller", "deviation")
 #: Samples of a record that can be told apart in a figure.
 _READABLE = 800
 
@@ -90,12 +92,13 @@ class Plots:
 
     def _loop(self, model: str, omega: Any) -> tuple[Array, Complex, Complex, Any]:
         """Frequencies in Hz, loop gain of each output with all other loops closed, G K, and the response of the model."""
+        if text(model, "model") in _NO_PLANTS:
+            plants = [key for key in self._run.models if key not in _NO_PLANTS]
+            raise InputError(f"model {model!r} is no plant, which the controller would control; choose of {', '.join(plants)}")
         found = self._run.frequency_response(omega, model=model)
         k = self._run.model("controller").frequency_response(found.omega).values
         if not np.any(k):
             raise InputError("the controller of this run is 0, so that there is no loop; draw run.plot.bode()")
-        if found.values.shape[1:] != k.shape[:0:-1]:
-            raise InputError(f"model {model!r} is no plant of the loop; name the recommended model or another of u and y")
         # The controller has positive feedback: the loop gain of the usual convention is -G K.
         gain = -found.values @ k
         s = np.linalg.inv(np.eye(gain.shape[1]) + gain)

@@ -27,8 +27,10 @@ def _axes(ax: Any, size: tuple[float, float] = (6.4, 4.8)) -> Any:
     """Axes of the caller, or new ones."""
     if ax is None:
         return need("matplotlib.pyplot").subplots(layout="constrained", figsize=size)[1]
-    if not hasattr(ax, "semilogx"):
+    if not hasattr(ax, "semilogx") or not hasattr(ax, "name"):
         raise InputError(f"ax is {ax!r}, but must be matplotlib axes, as plt.subplots() returns")
+    if ax.name != "rectilinear":
+        raise InputError(f"ax has the projection {ax.name!r}, but the figure needs rectangular axes; leave projection= and polar= out of plt.subplots()")
     return ax
 
 

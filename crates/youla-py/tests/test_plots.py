@@ -129,6 +129,30 @@ def test_figures_need_rectangular_axes(run: youla.Run, projection: str) -> None:
             draw()
 
 
+def test_channels_and_the_recommended_model_have_names(bearing: youla.Run) -> None:
+    by_name, by_number = bearing.plot.bode("recommended", output="y_v", input="u_h"), bearing.plot.bode("likelihood", output=1, input=0)
+    assert by_name[0].get_title() == by_number[0].get_title() == "u_h, V → y_v, um"
+    assert np.array_equal(drawn(by_name[0], "recommended").get_ydata(), drawn(by_number[0], "recommended").get_ydata())
+    for draw in (bearing.plot.nyquist, bearing.plot.loop, bearing.plot.parts, lambda **k: bearing.plot.compare([bearing], **k), bearing.plot.fit):
+        draw(output="y_h")
+        with pytest.raises(youla.InputError, match="output is 'y', but the outputs are y_h, y_v"):
+            draw(output="y")
+    with pytest.raises(youla.InputError, match="input is 'y_h', but the inputs are u_h, u_v"):
+        bearing.plot.bode(input="y_h")
+    assert np.array_equal(bearing.model("recommended").a, bearing.recommended.a)
+    assert bearing.modes("recommended") == bearing.modes()
+
+
+def test_a_missing_model_names_the_argument_that_computes_it(record: youla.Record, run: youla.Run) -> None:
+    bare = youla.identify(record, controller=2.0, feedback="negative")
+    for key, says in (("hansen", "give identify nominal= and hansen="), ("nominal", "give identify nominal="), ("new_controller", r"youla.redesign\(run\)")):
+        for call in (bare.plot.bode, bare.model, bare.modes, bare.plot.poles):
+            with pytest.raises(youla.InputError, match=f"this run has no model '{key}'; it has likelihood, controller.*; .*{says}"):
+                call(key)
+    with pytest.raises(youla.InputError, match="this run has no model 'bode'; it has [a-z, _]*$"):
+        run.plot.bode("bode")
+
+
 def test_a_study_draws_every_mode() -> None:
     c, s = np.cos([0.2, 0.6]), np.sin([0.2, 0.6])
     a = np.zeros((4, 4))

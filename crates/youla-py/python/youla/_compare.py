@@ -12,7 +12,7 @@ from typing import Any
 from . import _native
 from ._checks import listed, path_of, text
 from ._errors import InputError
-from ._figures import RECOMMENDED
+from ._names import label_of
 from ._pages import place_of_page
 from ._result import Run
 
@@ -72,6 +72,5 @@ def compare(
             for k, run in enumerate(runs)
         ]
         # Run folders name the recommended model by its file.
-        model = "recommended" if model == RECOMMENDED else model
-        found = json.loads(_native.compare(paths, model, place))
+        found = json.loads(_native.compare(paths, label_of(model), place))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))

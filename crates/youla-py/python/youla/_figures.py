@@ -13,14 +13,11 @@ from ._arrays import Array, as_floats
 from ._checks import kind, listed, place, text
 from ._errors import InputError
 from ._model import Complex, FrequencyResponse
+from ._names import NO_PLANTS, RECOMMENDED, label_of
 
 if TYPE_CHECKING:
     from ._result import Run
 
-#: Name of the recommended model among the models of a run.
-RECOMMENDED = "likelihood"
-#: Models of a run from other signals than u to others than y.
-_NO_PLANTS = ("controller", "new_controller", "deviation")
 #: Samples of a record that can be told apart in a figure.
 _READABLE = 800
 
@@ -45,8 +42,8 @@ class Plots:
         ax: Any = None,
         *,
         omega: Any = None,
-        output: int | None = None,
-        input: int | None = None,
+        output: int | str | None = None,
+        input: int | str | None = None,
         region: bool = True,
     ) -> Any:
         """Draw magnitude and phase of models with their regions, beside the measured response, as points.
@@ -59,8 +56,8 @@ class Plots:
             Where to draw: a pair for one entry, 2 p x m for all.
         omega : array_like, optional
             Angular frequencies, rad/s.
-        output, input : int, optional
-            Channels, counted from 0; all when absent.
+        output, input : int or str, optional
+            Channels, by name or counted from 0; all when absent.
         region : bool
             Whether to draw the 95 % bands.
 
@@ -73,8 +70,20 @@ class Plots:
         responses = [self._run.frequency_response(omega, model=key) for key in names]
         measured = self._run.measured_response
         coherence = None if measured is None else self._coherence(measured.values.shape)
-        choice = {"output": output, "input": input, "region": region}
-        return _plot.bode(responses, ax, **choice, measured=measured, coherence=coherence, labels=self._labels())  # type: ignore[arg-type]
+        entry = self._entry(output, input)
+        return _plot.bode(responses, ax, *entry, region=region, measured=measured, coherence=coherence, labels=self._labels())
+
+    def _number(self, channel: Any, what: str) -> Any:
+        """The number of a channel that is named; another value as it is."""
+        names = [name for name, _ in self._run._native.ports()[what == "output"]]
+        if not isinstance(channel, str):
+            return channel
+        if channel not in names:
+            raise InputError(f"{what} is {channel!r}, but the {what}s are {', '.join(names)}")
+        return names.index(channel)
+
+    def _entry(self, output: Any, input: Any) -> tuple[Any, Any]:
+        return self._number(output, "output"), self._number(input, "input")
 
     def _names(self, models: Any, usual: Sequence[str]) -> list[str]:
         there = self._run.models
@@ -92,8 +101,8 @@ class Plots:
 
     def _loop(self, model: str, omega: Any) -> tuple[Array, Complex, Complex, Any]:
         """Frequencies in Hz, loop gain of each output with all other loops closed, G K, and the response of the model."""
-        if text(model, "model") in _NO_PLANTS:
-            plants = [key for key in self._run.models if key not in _NO_PLANTS]
+        if text(model, "model") in NO_PLANTS:
+            plants = [key for key in self._run.models if key not in NO_PLANTS]
             raise InputError(f"model {model!r} is no plant, which the controller would control; choose of {', '.join(plants)}")
         found = self._run.frequency_response(omega, model=model)
         k = self._run.model("controller").frequency_response(found.omega).values
@@ -105,7 +114,7 @@ class Plots:
         alone: Complex = np.asarray(1 / np.diagonal(s, axis1=1, axis2=2) - 1, dtype=np.complex128)
         return found.hz, alone, gain, found
 
-    def nyquist(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int | None = None) -> Any:
+    def nyquist(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int | str | None = None) -> Any:
         """Draw the loop gain in the complex plane with -1, its margins, and the 95 % ellipses of a loop of one channel.
 
         Parameters
@@ -116,8 +125,8 @@ class Plots:
             Where to draw.
         omega : array_like, optional
             Angular frequencies, rad/s; those of the report when absent.
-        output : int, optional
-            Channel at which the loop is opened, all others closed, counted from 0; each of them when absent.
+        output : int or str, optional
+            Channel at which the loop is opened, all others closed, by name or counted from 0; each of them when absent.
 
         Returns
         -------
@@ -137,14 +146,15 @@ class Plots:
         names, shown = self._named(columns), alone[:, columns]
         return _plot.nyquist(shown, ellipses, names, [_margins(hz, x) for x in shown.T], ax)
 
-    def _opened(self, output: int | None, count: int) -> list[int]:
-        return list(range(count)) if output is None else [place(output, "output", count, f"the loop has {count} outputs")]
+    def _opened(self, output: int | str | None, count: int) -> list[int]:
+        number = self._number(output, "output")
+        return list(range(count)) if number is None else [place(number, "output", count, f"the loop has {count} outputs")]
 
     def _named(self, columns: list[int]) -> list[str]:
         outputs = [name for name, _ in self._run._native.ports()[1]]
         return ["loop gain"] if len(outputs) == 1 else [f"opened at {outputs[k]}" for k in columns]
 
-    def loop(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int | None = None) -> Any:
+    def loop(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int | str | None = None) -> Any:
         """Draw the loop gain with its margins, and sensitivity S and complementary sensitivity T with their peaks.
 
         Parameters
@@ -166,15 +176,15 @@ class Plots:
         shown = alone[:, columns]
         return _plot.loop(hz, shown, sizes, self._named(columns), [_margins(hz, x) for x in shown.T], ax)
 
-    def parts(self, ax: Any = None, *, output: int | None = None, input: int | None = None) -> Any:
+    def parts(self, ax: Any = None, *, output: int | str | None = None, input: int | str | None = None) -> Any:
         """Draw the deviation of the recommended response by its causes, beside its magnitude.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
             Where to draw, p x m for all entries.
-        output, input : int, optional
-            Channels, counted from 0; all when absent.
+        output, input : int or str, optional
+            Channels, by name or counted from 0; all when absent.
 
         Returns
         -------
@@ -188,10 +198,10 @@ class Plots:
         deviations = {name: np.array(values, dtype=np.float64) for name, values in of.items()}
         hz = np.array(found["response_deviation"]["hz"])
         model = self._run.frequency_response(2 * np.pi * hz)
-        return _plot.parts(hz, model, deviations, self._labels(), ax, output, input)
+        return _plot.parts(hz, model, deviations, self._labels(), ax, *self._entry(output, input))
 
     def compare(
-        self, runs: Any, ax: Any = None, *, model: str = RECOMMENDED, omega: Any = None, output: int | None = None, input: int | None = None
+        self, runs: Any, ax: Any = None, *, model: str = RECOMMENDED, omega: Any = None, output: int | str | None = None, input: int | str | None = None
     ) -> Any:
         """Draw the responses of one model of this and other runs with their regions.
 
@@ -221,7 +231,7 @@ class Plots:
                 raise InputError(f"runs[{k - 1}] is {shapes[0][0]} x {shapes[0][1]}, but this run {shapes[-1][0]} x {shapes[-1][1]}; compare runs of one machine")
             label = run.name if [r.name for r in (self._run, *others)].count(run.name) == 1 else f"{run.name} ({k + 1})"
             responses.append(replace(response, name=label))
-        return _plot.bode(responses, ax, output=output, input=input, labels=self._labels())
+        return _plot.bode(responses, ax, *self._entry(output, input), labels=self._labels())
 
     def poles(self, models: Any = None, ax: Any = None) -> Any:
         """Draw the poles of models in the z plane.
@@ -241,7 +251,7 @@ class Plots:
         return _plot.poles([self._run.model(key) for key in names], ax)
 
     def fit(
-        self, record: int = 0, ax: Any = None, *, model: str = RECOMMENDED, output: int = 0, seconds: Any = None
+        self, record: int = 0, ax: Any = None, *, model: str = RECOMMENDED, output: int | str = 0, seconds: Any = None
     ) -> Any:
         """Draw a verification record beside its prediction by a model.
 
@@ -253,8 +263,8 @@ class Plots:
             Where to draw.
         model : str
             Name of the model.
-        output : int
-            Channel, counted from 0.
+        output : int or str
+            Channel, by name or counted from 0.
         seconds : pair of float, optional
             Part of the record that is drawn, from its start; its middle 800 samples when absent.
 
@@ -266,16 +276,17 @@ class Plots:
         predictions = self._run.predictions
         held = f"the run has {len(predictions)} verification records (verify= of identify)"
         found = predictions[place(record, "record", len(predictions), held)]
-        if text(model, "model") not in found.predicted:
+        model = self._run._key(model)
+        if model not in found.predicted:
             raise InputError(f"model {model!r} predicts nothing on {found.record!r}; choose of {', '.join(found.predicted)}")
         count = found.measured.shape[1]
-        place(output, "output", count, f"the record has {count} outputs")
+        at = place(self._number(output, "output"), "output", count, f"the record has {count} outputs")
         t: Array = np.arange(len(found.measured), dtype=np.float64) * self._run.model("controller").dt
         rows = _part(t, seconds)
         fits = self._run.fits.get(model, {}).get(found.record)
-        value = "" if fits is None or fits[output] is None else f", fit {fits[output]:.1f} % of {t[-1]:.3g} s"
-        labels = (f"{found.record}{value}", self._labels()[0][output], "recommended" if model == RECOMMENDED else model)
-        return _plot.fit(t[rows], found.measured[rows, output], found.predicted[model][rows, output], labels, ax)
+        value = "" if fits is None or fits[at] is None else f", fit {fits[at]:.1f} % of {t[-1]:.3g} s"
+        labels = (f"{found.record}{value}", self._labels()[0][at], label_of(model))
+        return _plot.fit(t[rows], found.measured[rows, at], found.predicted[model][rows, at], labels, ax)
 
 
 def _part(t: Array, seconds: Any) -> slice:

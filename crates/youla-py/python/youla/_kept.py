@@ -163,8 +163,7 @@ class Kept:
 
     def response(self, key: str, hz: Array) -> Any:
         model = self.model(key)
-        if model is None:
-            raise InputError(f"this run has no model {key!r}; it has {', '.join(self.models())}")
+        assert model is not None  # a run asks for models that are there
         region = self._region()
         if key == "likelihood" and region is not None:
             return region.response(model, hz)

@@ -60,10 +60,10 @@ def chosen(response: FrequencyResponse, output: int | None, input: int | None) -
 def bode(
     responses: Sequence[FrequencyResponse],
     ax: Any = None,
-    *,
-    region: bool = True,
     output: int | None = None,
     input: int | None = None,
+    *,
+    region: bool = True,
     measured: FrequencyResponse | None = None,
     coherence: Coherence = None,
     labels: Labels | None = None,

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from ._arrays import Array
-from ._checks import path_of, text, truth, write_file
-from ._errors import InputError, NumericalError
-from ._figures import RECOMMENDED, Plots
+from ._checks import path_of, truth, write_file
+from ._errors import InputError
+from ._figures import Plots
 from ._kept import Kept, Results, files_of, read_folder
 from ._model import FrequencyResponse, Mode, Model, RealPole, _model_of, frequencies
+from ._names import RECOMMENDED, key_of, label_of
 from ._optional import need
 from ._pages import place_of_page
 from ._verdict import Evidence, Prediction, Verdict, VerdictTest
@@ -25,7 +26,7 @@ class Run:
 
     Notes
     -----
-    Models are named ``likelihood`` (the recommended one), ``nominal``, ``hansen``, ``hansen_reduced``, ``direct``,
+    Models are named ``likelihood`` (the recommended one, also by ``recommended``), ``nominal``, ``hansen``, ``hansen_reduced``, ``direct``,
     ``grey_box``, ``true_plant`` (simulations), ``controller`` (positive feedback, u = K y), ``deviation`` (S) and
     ``new_controller``.
 
@@ -95,7 +96,7 @@ class Run:
         Parameters
         ----------
         name : str
-            One of `models`.
+            One of `models`, or ``"recommended"``.
 
         Returns
         -------
@@ -109,21 +110,20 @@ class Run:
         NumericalError
             For a model that was asked for and is impossible, with the reason.
         """
-        found = self._native.model(text(name, "name"))
-        if found is None:
-            key = "recommended" if name == RECOMMENDED else name
-            if key in self.summary["refused"]:
-                raise NumericalError(f"there is no model {name!r}: {self.summary['refused'][key]}")
-            raise InputError(f"this run has no model {name!r}; it has {', '.join(self.models)}")
+        key = self._key(name, "name")
+        found = self._native.model(key)
+        assert found is not None
         a, b, c, d, dt = found
         u, y = ([channel for channel, _ in channels] for channels in self._native.ports())
-        if name in ("controller", "new_controller"):
+        if key in ("controller", "new_controller"):
             u, y = y, u
-        elif name == "deviation":
+        elif key == "deviation":
             u, y = [f"alpha of {n}" for n in u], [f"beta of {n}" for n in y]
-        label = "recommended" if name == RECOMMENDED else name
-        dead_time = self.summary["recommended"]["dead_time"] if name == RECOMMENDED else ()
-        return _model_of((a, b, c, d), dt, u, y, label, dead_time)
+        dead_time = self.summary["recommended"]["dead_time"] if key == RECOMMENDED else ()
+        return _model_of((a, b, c, d), dt, u, y, label_of(key), dead_time)
+
+    def _key(self, name: Any, what: str = "model") -> str:
+        return key_of(name, what, self.models, self.summary["refused"])
 
     @property
     def recommended(self) -> Model:
@@ -193,8 +193,9 @@ class Run:
 
     def _listed(self, model: str, key: str) -> list[dict[str, Any]] | None:
         """What summary.json lists of a model; `None` for one that it does not describe."""
-        entry = self.summary["methods"].get(text(model, "model"))
-        found: list[dict[str, Any]] | None = None if entry is None else (self.summary["recommended"] if model == RECOMMENDED else entry)[key]
+        name = self._key(model)
+        entry = self.summary["methods"].get(name)
+        found: list[dict[str, Any]] | None = None if entry is None else (self.summary["recommended"] if name == RECOMMENDED else entry)[key]
         return found
 
     def frequency_response(self, omega: Any = None, *, model: str = RECOMMENDED) -> FrequencyResponse:
@@ -214,8 +215,9 @@ class Run:
         from ._identify import with_region
 
         w = frequencies(self._native.hz() * (2 * np.pi) if omega is None else omega, self._dt)
-        values, known = self._native.response(text(model, "model"), w / (2 * np.pi))
-        return with_region(w, values, known, "recommended" if model == RECOMMENDED else model)
+        key = self._key(model)
+        values, known = self._native.response(key, w / (2 * np.pi))
+        return with_region(w, values, known, label_of(key))
 
     @property
     def measured_response(self) -> FrequencyResponse | None:

@@ -68,7 +68,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "text": (lambda: rec(TABLE.astype(str)), "data holds text"),
     "complex": (lambda: rec(TABLE.astype(complex)), "data holds complex numbers"),
     "ragged": (lambda: rec([[1.0, 2.0, 3.0], [1.0]]), "give rows of equal length"),
-    "masked": (lambda: rec(np.ma.masked_greater(TABLE, 1.0)), "masked values; fill or cut them out"),
+    "masked": (lambda: rec(np.ma.masked_greater(TABLE, 1.0)), "data has masked values at sample"),
     "NaN": (lambda: ident(rec(with_nan())), "not finite at sample 17"),
     "one sample": (lambda: rec({"u": [1.0], "y": [1.0]}, inputs="u", outputs="y", excitation=None), "at least 2"),
     "lengths differ": (lambda: youla.Record({"u": U, "y": Y[:-1]}, **NAMED), "channels differ in length"),

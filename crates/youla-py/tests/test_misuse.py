@@ -6,10 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from conftest import loop
 
 import youla
 
+KNOWN: dict[str, Any] = {"controller": 2.0, "feedback": "negative"}
 Call = Callable[[youla.Run], Any]
 
 #: Calls on a run, with what they are told.
@@ -36,6 +39,39 @@ def test_a_misuse_is_refused(case: str, run: youla.Run) -> None:
     with pytest.raises(youla.InputError, match=says) as told:
         call(run)
     assert "run.toml" not in str(told.value)
+
+
+def refused(call: Callable[[], Any]) -> str:
+    with pytest.raises(youla.InputError) as told:
+        call()
+    return str(told.value)
+
+
+def test_runs_of_missing_samples_leave_parts_without_them() -> None:
+    table = loop(5, 1000)
+    table[500:503, 1] = np.nan
+    table[501:504, 0] = np.inf
+    log = youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01)
+    told = refused(lambda: youla.identify(log, **KNOWN))
+    assert "'u' is not finite at samples 501 to 503, counted from 0; " in told
+    assert "[record[:500], record[504:]]" in told
+    youla.identify([log[:500], log[504:]], **KNOWN)
+    empty = youla.Record(np.full_like(table, np.nan), inputs=0, outputs=1, dt=0.01)
+    assert "'u' is not finite at samples 0 to 999, counted from 0; check its column" in refused(lambda: youla.identify(empty, **KNOWN))
+
+
+def test_a_masked_array_is_cut_by_rows() -> None:
+    table = loop(5, 1000)
+    masked = np.ma.array(table, mask=np.zeros_like(table, dtype=bool))
+    masked[500:503, 1] = masked[0, 0] = np.ma.masked
+    told = refused(lambda: youla.Record(masked, inputs=0, outputs=1, dt=0.01))
+    assert "data has masked values at sample 0, counted from 0, and at 1 more place; " in told
+    assert "data[1:500], data[503:], and give identify their list" in told
+    assert youla.Record(masked[1:500], inputs=0, outputs=1, dt=0.01).samples == 499
+    scattered = np.ma.array(table[:, 0], mask=np.arange(1000) % 100 == 50)
+    told = refused(lambda: youla.Record({"u": scattered, "y": table[:, 1]}, inputs="u", outputs="y", dt=0.01))
+    assert "data[:50], data[51:150], data[151:250], data[251:350], ..., and give" in told
+    assert "synchronise(dt=) fills single samples" in told
 
 
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:

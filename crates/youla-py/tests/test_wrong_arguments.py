@@ -68,7 +68,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "a record": (lambda: rec(rec()), "data is already a youla.Record; use it as it is"),
     "fields": (lambda: rec(FIELDS), "records with fields, but must hold real numbers; give a mapping"),
     "complex column": (lambda: named({"u": U + 0j, "y": Y}), "channel 'u' holds complex numbers, but must hold real numbers; a frequency response"),
-    "masked column": (lambda: named({"u": np.ma.masked_greater(U, 1), "y": Y}), "channel 'u' has masked values; fill or cut"),
+    "masked column": (lambda: named({"u": np.ma.masked_greater(U, 1), "y": Y}), "channel 'u' has masked values at sample"),
     "durations": (lambda: rec(TABLE.astype("m8[s]")), "data holds durations, but must hold real numbers; name the column with the time"),
     "tensor": (lambda: rec(Tensor()), "data is a Tensor that is no NumPy array: use tensor.detach().numpy() instead"),
     "empty": (lambda: rec(np.zeros((0, 3))), "data has no samples"),

@@ -52,7 +52,7 @@ def as_floats(values: Any, what: str) -> Array:
         For text, objects, complex numbers, masked values and dates.
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise InputError(f"{what} has masked values; fill or cut them out first, for example with .compressed()")
+        raise InputError(f"{what} has masked values; fill them or cut them out first")
     limited(values, what)
     try:
         array = np.asarray(values)

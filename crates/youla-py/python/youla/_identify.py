@@ -13,6 +13,7 @@ from ._arrays import Array, whole
 from ._channels import Channels, Synchronised
 from ._checks import file_of, text
 from ._errors import InputError
+from ._gaps import refuse_not_finite
 from ._model import FrequencyResponse, _numbered
 from ._options import check_options, plain
 from ._record import Record
@@ -224,14 +225,9 @@ def _log_of(record: Record) -> Log:
     # One pass over the array as it lies in memory; a NaN fails the comparison too.
     if log[3].max() <= 1e100 and log[3].min() >= -1e100:
         return log
-    for name, _, column in log[2]:
-        bad = np.flatnonzero(~np.isfinite(log[3][:, column]))
-        if bad.size:
-            k = int(bad[0])
-            raise InputError(
-                f"{record.name}: channel {name!r} is not finite at sample {k}, counted from 0 ({bad.size} such samples); identify from the parts "
-                f"without them, such as [{f'record[:{k}], ' if k > 1 else ''}record[{k + 1}:]]"
-            )
+    bad = {name: ~np.isfinite(log[3][:, column]) for name, _, column in log[2]}
+    if any(samples.any() for samples in bad.values()):
+        refuse_not_finite(bad, record.name)
     columns = [log[3][:, column] for _, _, column in log[2]]
     largest = max(max(column.max(), -column.min()) for column in columns)
     if largest > 1e100 and np.isfinite(largest):

@@ -14,6 +14,7 @@ from . import _native
 from ._arrays import Array, as_floats
 from ._checks import kind
 from ._errors import InputError
+from ._gaps import refuse_masked
 from ._optional import need
 
 
@@ -101,6 +102,7 @@ def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
 
 
 def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
+    refuse_masked(data, "data")
     array = as_floats(data, "data")
     if array.ndim == 0:
         raise InputError(f"data is {kind(data)}, but must be samples x channels, a mapping, a data frame or the path of a file")
@@ -123,6 +125,8 @@ def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
 
 
 def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | None) -> Source:
+    for name, values in columns.items():
+        refuse_masked(values, f"channel {name!r}")
     arrays = {name: as_floats(values, f"channel {name!r}") for name, values in columns.items()}
     for name, array in arrays.items():
         if array.ndim != 1:

@@ -74,6 +74,17 @@ def test_a_masked_array_is_cut_by_rows() -> None:
     assert "synchronise(dt=) fills single samples" in told
 
 
+def test_a_log_in_the_place_of_settings_names_its_columns(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,inj,pos,torque\n0,1,2,3\n")
+    told = refused(lambda: youla.identify(log, **KNOWN))
+    assert told == "record is log.csv, a log; give youla.Record('log.csv', inputs=, outputs=, time=) in its place; its columns are time_s, inj, pos, torque"
+    log.write_text("0;1,5;2;3\n")
+    assert refused(lambda: youla.identify(log)).endswith("in its place")
+    np.savez(tmp_path / "log.npz", u=[1.0])
+    assert "record is log.npz, a log" in refused(lambda: youla.identify(tmp_path / "log.npz"))
+
+
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

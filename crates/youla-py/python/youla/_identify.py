@@ -19,6 +19,7 @@ from ._options import check_options, plain
 from ._record import Record
 from ._response import Response, data_of
 from ._result import Run
+from ._sources import refuse_log
 from ._systems import UnstatedSign, controller_table, nominal_table
 from ._types import Log, Table
 
@@ -90,6 +91,7 @@ def identify(
     (1, True)
     """
     if isinstance(record, (str, os.PathLike)):
+        refuse_log(record, "record")
         if nominal is not None or controller is not None or verify is not None or options:
             raise InputError("a run.toml states everything; leave the other arguments out, or give a youla.Record")
         return Run(_native.identify_file(file_of(record, "record")))

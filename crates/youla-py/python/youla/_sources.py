@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, as_floats
-from ._checks import kind
+from ._checks import file_of, kind, path_of
 from ._errors import InputError
 from ._gaps import refuse_masked
 from ._optional import need
@@ -243,6 +243,35 @@ def _of_parquet(
         return _of_columns(columns, time, dt)
     dates = columns.pop(str(time))
     return _of_columns(columns, None, _clock((dates - dates[:1]) / np.timedelta64(1, "s"), dt, f"time {time!r}"))
+
+
+def refuse_log(path: Any, what: str) -> None:
+    """Refuse the path of a log where that of a run.toml is taken: nothing says what its columns mean."""
+    name = os.path.basename(path_of(path, what))
+    if not name.lower().endswith(".toml"):
+        columns = _columns_of(file_of(path, what))
+        known = f"; its columns are {', '.join(columns)}" if columns else ""
+        raise InputError(f"{what} is {name}, a log; give youla.Record({name!r}, inputs=, outputs=, time=) in its place{known}")
+
+
+def _columns_of(path: str) -> list[str]:
+    """Names of the columns of a text file, as far as its first line has them."""
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            line = file.readline(2000).strip()
+    except (OSError, UnicodeDecodeError):
+        return []
+    mark = max(",;\t", key=line.count)
+    names = [name.strip(" \"'") for name in line.split(mark)]
+    return names if len(names) > 1 and not any(_is_number(name) for name in names) else []
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 @dataclass(frozen=True)

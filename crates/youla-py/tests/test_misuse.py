@@ -85,6 +85,51 @@ def test_a_log_in_the_place_of_settings_names_its_columns(tmp_path: Path) -> Non
     assert "record is log.npz, a log" in refused(lambda: youla.identify(tmp_path / "log.npz"))
 
 
+def frame(samples: int = 500) -> Any:
+    pd = pytest.importorskip("pandas")
+    return pd.DataFrame(loop(5, samples), columns=["u", "y", "d"], index=pd.Index(0.01 * np.arange(samples), name="t"))
+
+
+def of_frame(data: Any, **changes: Any) -> youla.Record:
+    return youla.Record(data, **{"inputs": "u", "outputs": "y", **changes})
+
+
+def test_an_index_is_named_where_it_holds_the_time_or_falls() -> None:
+    data = frame()
+    dated = data.set_axis(np.datetime64("2026-01-01") + np.arange(500) * np.timedelta64(10, "ms"))
+    shuffled = data.iloc[[1, 0, *range(2, 500)]]
+    for call, says in (
+        (lambda: of_frame(data), "dt is missing: give time='index', which takes the index of data"),
+        (lambda: of_frame(dated), "dt is missing: give time='index'"),
+        (lambda: of_frame(data.reset_index()), "dt is missing: give the sample time in seconds, or time= with the column"),
+        (lambda: of_frame(data[::-1], time="index"), "^the index of data falls, newest row first; give data.sort_index"),
+        (lambda: of_frame(dated[::-1], time="index"), "^the index of data falls, newest row first; give data.sort_index"),
+        (lambda: of_frame(data.reset_index()[::-1], time="t"), r"^time 't' falls, newest row first; give data\[::-1\]"),
+        (lambda: of_frame(data.assign(t=1.0), time="t"), "^time 't' stands still; give the time of every row, or the sample time as dt=$"),
+        (lambda: of_frame(data[::-1], dt=0.01), r"^the index of data falls, newest row first; give data.sort_index\(\), or data.reset_index"),
+        (lambda: of_frame(data.reset_index()[::-1], dt=0.01), "^the index of data falls, newest row first"),
+        (lambda: of_frame(dated[::-1], dt=0.01), "^the index of data falls, newest row first"),
+        (lambda: of_frame(shuffled, dt=0.01), "^the index of data falls at some rows"),
+    ):
+        with pytest.raises(youla.InputError, match=says):
+            call()
+    for good in (data, dated, data.set_axis(list("ab") * 250), data.iloc[100:]):
+        assert of_frame(good, dt=0.01).dt == 0.01
+
+
+def test_a_channel_is_no_array() -> None:
+    data, table = frame(), loop(5, 500)
+    for call, says in (
+        (lambda: youla.Record(table, inputs=0, outputs=1, excitation=table[:, 2], dt=0.01), r"^excitation is an array of 500 values, .*; put it into data as a column, by numpy.column_stack or data\['d'\] = ..., and name that column$"),
+        (lambda: of_frame(data, inputs=data["u"], dt=0.01), "^inputs is an array of 500 values"),
+        (lambda: of_frame(data, reference=np.zeros(500, dtype=int), dt=0.01), "^reference is an array of 500 values"),
+    ):
+        with pytest.raises(youla.InputError, match=says):
+            call()
+    assert of_frame(data, inputs=data.columns[:1], dt=0.01).inputs == ("u",)
+    assert youla.Record(table, inputs=np.array([0]), outputs=1, dt=0.01).inputs == ("u",)
+
+
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

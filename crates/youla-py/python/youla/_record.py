@@ -26,6 +26,11 @@ _GROUPS = (
     ("alpha", "alpha", "alpha"),
 )
 
+_LETTERS = {group: letter for group, _, letter in _GROUPS}
+
+#: An array of more numbers holds a channel, not column numbers.
+_MOST_CHANNELS = 100
+
 
 class Record:
     """A log of a machine under feedback.
@@ -291,6 +296,12 @@ def _listed(names: Names, group: str) -> list[str | int]:
     if isinstance(names, Mapping):
         raise InputError(f"{group} is {names!r}; channels are chosen by name or column number, or a list of them")
     places = [names] if isinstance(names, (int, np.integer)) else listed(names, group, "names or column numbers")
+    values = np.asarray(names) if hasattr(names, "__array__") and not hasattr(names, "columns") else np.empty(0)
+    if values.ndim and values.size and (values.dtype.kind in "fc" or values.size > _MOST_CHANNELS):
+        raise InputError(
+            f"{group} is an array of {values.size} values, but channels are chosen by name or column number; put it into data as a column, "
+            f"by numpy.column_stack or data[{_LETTERS[group]!r}] = ..., and name that column"
+        )
     for place in places:
         if isinstance(place, bool) or not isinstance(place, (str, int, np.integer)):
             raise InputError(f"{group} has {place!r}; channels are chosen by name or column number")

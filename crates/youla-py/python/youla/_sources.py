@@ -77,7 +77,8 @@ def require_seconds(what: str, column: Any, otherwise: str = "") -> None:
         )
 
 
-def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
+def _clock(times: Any, dt: float | None, what: str, column: Any = "", turned: str = "data[::-1]") -> float:
+    """The sample time; `turned` is how rows in falling order are put right."""
     if times is None and dt is None:
         raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
     if times is None:
@@ -89,9 +90,12 @@ def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
         raise InputError(f"{what} has a value that is not finite; cut these rows out")
     steps = np.diff(seconds.ravel())
     usual = float(np.median(steps)) if steps.size else 0.0
+    if steps.size and usual <= 0:
+        falls = f"falls, newest row first; give {turned}" if usual < 0 else "stands still; give the time of every row, or the sample time as dt="
+        raise InputError(f"{what} {falls}")
     # As the readers of files have it: a step may differ from the others by 1 %.
     uneven = np.flatnonzero(np.abs(steps - usual) > 0.01 * abs(usual))
-    if usual > 0 and uneven.size:
+    if uneven.size:
         k = int(uneven[0])
         raise InputError(
             f"{what} is not uniform: sample {k + 1}, counted from 0, comes {steps[k]:.6g} s after the one before, the usual step is {usual:.6g} s "
@@ -166,10 +170,23 @@ def _of_pandas(data: Any, chosen: dict[str, list[str | int]], time: str | int | 
     if time == "index" and "index" not in data.columns:
         times, time = _index_seconds(data.index), None
         unit = data.index.name if data.index.dtype.kind in "fiu" else ""
+    elif time is None:
+        _check_unused(data.index, dt)
     columns = {name: data[name].to_numpy() for name in _needed(list(data.columns), chosen, time)}
     if times is None:
         return _of_columns(columns, time, dt)
-    return _of_columns(columns, None, _clock(times, dt, "the index of data", unit))
+    return _of_columns(columns, None, _clock(times, dt, "the index of data", unit, "data.sort_index()"))
+
+
+def _check_unused(index: Any, dt: float | None) -> None:
+    """An index that nobody asked for may hold the time, and shows rows in another order than they were measured."""
+    if index.nlevels > 1 or index.dtype.kind not in "fiuMm":
+        return
+    if dt is None and type(index).__name__ != "RangeIndex":
+        raise InputError("dt is missing: give time='index', which takes the index of data in seconds, dates or durations, or the sample time in seconds")
+    if not index.is_monotonic_increasing:
+        how = "falls, newest row first" if index.is_monotonic_decreasing else "falls at some rows"
+        raise InputError(f"the index of data {how}; give data.sort_index(), or data.reset_index(drop=True) where the rows are in the order of their time")
 
 
 def _index_seconds(index: Any) -> Any:

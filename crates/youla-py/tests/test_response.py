@@ -87,6 +87,8 @@ def test_coherence_weighs() -> None:
         ({"g": G, "hz": -HZ}, "hz must be finite frequencies above 0"),
         ({"g": G, "omega": HZ}, "the frequencies are given twice"),
         ({"g": G, "dt": 0}, "dt is 0"),
+        ({"g": 20 * np.log10(np.abs(G))}, r"g is real at all frequencies, but a response has a phase; of dB and degrees give 10 \*\* \(db / 20\) \* numpy.exp"),
+        ({"ud": np.abs(G), "yd": G}, "ud is real at all frequencies"),
     ],
 )
 def test_what_cannot_be_a_response(given: dict, says: str) -> None:
@@ -95,8 +97,10 @@ def test_what_cannot_be_a_response(given: dict, says: str) -> None:
 
 
 def test_what_does_not_fit_the_loop() -> None:
-    with pytest.raises(youla.InputError, match="above the Nyquist frequency of 50 Hz"):
-        youla.identify(youla.Response(hz=2 * HZ, g=G), **KNOWN)
+    with pytest.raises(youla.InputError, match=r"above the Nyquist frequency of 50 Hz.*, or give omega= in place of hz= where they are in rad/s$"):
+        youla.identify(youla.Response(hz=2 * np.pi * HZ, g=G), **KNOWN)
+    with pytest.raises(youla.InputError, match="above the Nyquist frequency of 50 Hz.*, or check dt$"):
+        youla.identify(youla.Response(4 * np.pi * HZ, g=G), **KNOWN)
     with pytest.raises(youla.InputError, match="dt is missing, which a response does not show"):
         youla.identify(youla.Response(hz=HZ, g=G), nominal=0.1, controller=2.0, feedback="negative")
     control = pytest.importorskip("control")

@@ -91,7 +91,7 @@ class Response:
         if any(x.shape[2] != columns for x, _ in found) or (g is None and found[0][0].shape[1] != columns):
             shapes = " and ".join(f"{key} is {x.shape}" for (key, _), (x, _) in zip(given, found, strict=True))
             raise InputError(f"{shapes}, but ud must be (n, m, m) and yd (n, p, m), with one excitation for each input")
-        self._of_loop, self.omega = g is None, w
+        self._of_loop, self._in_hz, self.omega = g is None, hz is not None, w
         self.values: Complex = np.concatenate([x for x, _ in found], axis=1)
         self._variance, self._known = self._errors(sd, coherence, found)
         self.dt = None if dt is None else positive(dt, "dt")
@@ -135,9 +135,10 @@ class Response:
     def _table(self, dt: float) -> Table:
         above = self.omega > np.pi / dt * (1 + 1e-9)
         if above.any():
+            unit = ", or give omega= in place of hz= where they are in rad/s" if self._in_hz else ""
             raise InputError(
                 f"{self.name} reaches {self.hz[-1]:.4g} Hz, above the Nyquist frequency of {0.5 / dt:.4g} Hz of dt={dt:g} s; "
-                "leave these frequencies out, or check dt"
+                f"leave these frequencies out, or check dt{unit}"
             )
         variance = None if self._variance is None else np.ascontiguousarray(self._variance)
         return self.omega, np.ascontiguousarray(self.values), variance, self._known, self._of_loop
@@ -169,6 +170,10 @@ def _values(given: Any, what: str, count: int) -> tuple[Complex, Array | None]:
     bad = ~np.isfinite(array).all(axis=tuple(k for k in range(array.ndim) if k != array.ndim - 3))
     if bad.any():
         raise InputError(f"{what} is not finite at frequency {int(np.argmax(bad))}, counted from 0; leave this frequency out")
+    if count > 1 and not array.imag.any():
+        raise InputError(
+            f"{what} is real at all frequencies, but a response has a phase; of dB and degrees give 10 ** (db / 20) * numpy.exp(1j * numpy.deg2rad(deg))"
+        )
     if array.ndim == 3:
         return array, None
     repetitions = len(array)

@@ -118,6 +118,22 @@ def test_identification_leaves_its_input_as_it_was(nominal: youla.Model) -> None
     assert table.flags.writeable
 
 
+def test_an_array_that_was_changed_is_refused() -> None:
+    table = loop(5, 10_000)
+    log = youla.Record(table, inputs=0, outputs=1, dt=0.01, name="log")
+    part = log[5000:]
+    table[:, 2] = 0.0  # no channel of the record
+    youla.check(log)
+    for change in (lambda: table[:, 1].__imul__(1e3), lambda: table.__setitem__((-1, 0), np.nan)):
+        kept = table.copy()
+        change()
+        for use in (lambda: youla.check(log), lambda: youla.identify(part, controller=2.0, feedback="negative"), lambda: log[:100], log.split):
+            with pytest.raises(youla.InputError, match=r"the array of log was changed after youla.Record\(...\); give Record data.copy\(\)"):
+                use()
+        table[:] = kept
+    youla.check(part)
+
+
 def test_cuts_are_records(record: youla.Record) -> None:
     first, second = record.split(0.25)
     assert (first.samples, second.samples) == (1000, 3000)

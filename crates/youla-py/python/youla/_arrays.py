@@ -51,7 +51,7 @@ def as_floats(values: Any, what: str) -> Array:
     InputError
         For text, objects, complex numbers, masked values and dates.
     """
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+    if masked(values):
         raise InputError(f"{what} has masked values; fill them or cut them out first")
     limited(values, what)
     try:
@@ -67,6 +67,12 @@ def as_floats(values: Any, what: str) -> Array:
         raise InputError(f"{what} holds {found}, but must hold real numbers; {remedy}")
     floats: Array = np.asarray(array, dtype=np.float64)
     return floats
+
+
+def masked(values: Any) -> bool:
+    """Whether an array has masked values; where numpy.ma is not loaded, which takes 1 MB, there is none."""
+    ma = sys.modules.get("numpy.ma")
+    return ma is not None and isinstance(values, ma.MaskedArray) and bool(ma.is_masked(values))
 
 
 def limited(values: Any, what: str) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ._arrays import masked
 from ._errors import InputError
 
 #: Most parts that a message lists.
@@ -41,7 +42,7 @@ def _many(bad: Any) -> str:
 
 def refuse_masked(values: Any, what: str) -> None:
     """Refuse masked values of a record with the parts that have none."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values) and values.ndim:
+    if masked(values) and values.ndim:
         bad = np.ma.getmaskarray(values).reshape(len(values), -1).any(axis=1)
         raise InputError(
             f"{what} has masked values at {_where(bad)}; make a Record of each part without them, "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -25,6 +26,9 @@ _GROUPS = (
     ("reference", "reference", "r"),
     ("alpha", "alpha", "alpha"),
 )
+
+#: Rows that tell whether an array was changed.
+_COMPARED = 4096
 
 _LETTERS = {group: letter for group, _, letter in _GROUPS}
 
@@ -71,7 +75,8 @@ class Record:
 
     Notes
     -----
-    An array of float64 is not copied, and never changed.
+    An array of float64 is not copied, and never changed. Where you change it afterwards, the record is refused; a few thousand rows are
+    compared.
 
     Examples
     --------
@@ -145,6 +150,7 @@ class Record:
             raise InputError(f"units names {sorted(units)}, which are no channels; channels are {sorted(self._labels())}")
         if len(self) < 2:
             raise InputError(f"data has {len(self)} samples, but a record needs at least 2")
+        self._mark = self._checksum()
 
     def _labels(self) -> list[str]:
         return [name for group in self._groups.values() for name, _, _ in group]
@@ -226,11 +232,26 @@ class Record:
             raise InputError(f"a record is cut by numbers of samples, not by {rows.start!r}:{rows.stop!r}; divide seconds by dt")
         return self._with(self._data[rows], self._name)
 
+    def _checksum(self) -> int:
+        """Of the values in rows that are spread over the record, the first and the last among them."""
+        rows = np.linspace(0, len(self) - 1, min(len(self), _COMPARED)).astype(np.intp)
+        found = 0
+        for column in sorted({column for group in self._groups.values() for _, _, column in group}):
+            found = crc32(self._data[rows, column].tobytes(), found)
+        return found
+
+    def _unchanged(self) -> None:
+        """Refuse an array that was changed in place: the record would be of other data than was seen."""
+        if self._checksum() != self._mark:
+            raise InputError(f"the array of {self._name} was changed after youla.Record(...); give Record data.copy(), or make the Record after the change")
+
     def _with(self, data: Array, name: str) -> Record:
+        self._unchanged()
         part = object.__new__(Record)
         part._name, part._data, part._dt, part._groups, part._steps = name, data, self._dt, self._groups, self._steps
         if len(part) < 2:
             raise InputError(f"the rows that are left are {len(part)}, but a record needs at least 2")
+        part._mark = part._checksum()
         return part
 
     def named(self, name: str) -> Record:
@@ -276,6 +297,7 @@ class Record:
         return f"<youla.Record {self._name!r}: {len(self)} samples of {self._dt:g} s, {groups}>"
 
     def _log(self) -> Log:
+        self._unchanged()
         channels = [channel for group in self._groups.values() for channel in group]
         return (self._name, self._dt, channels, self._data)
 

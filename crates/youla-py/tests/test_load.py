@@ -139,6 +139,18 @@ def test_every_run_can_be_repeated(demo: youla.Run, run: youla.Run, tmp_path: Pa
     assert studies[0] == studies[1]
 
 
+def test_settings_that_were_changed_after_the_run_are_refused(tmp_path: Path, run: youla.Run) -> None:
+    settings = Path(run.save(tmp_path / "run")) / "run.toml"
+    ran = settings.read_text()
+    assert "horizon = 10" in ran
+    for changed in (ran.replace("horizon = 10", "horizon = 11"), ran + "[data"):
+        settings.write_text(changed)
+        with pytest.raises(youla.InputError, match="run.toml was changed after the run, whose results are of other settings; identify anew"):
+            youla.load(tmp_path / "run")
+    settings.write_text("# mine\n" + ran.replace("\n", "\r\n"))
+    assert youla.load(tmp_path / "run").recommended.order == run.recommended.order
+
+
 def test_what_is_no_run_folder(tmp_path: Path, run: youla.Run) -> None:
     with pytest.raises(youla.InputError, match="is not there, but must be a run folder"):
         youla.load(tmp_path / "absent")

@@ -89,8 +89,21 @@ def read_folder(folder: str) -> Files:
     for name in ("summary.json", "report.json", "run.toml", "4-identify/frequencies.mat"):
         if name not in found:
             raise InputError(f"folder {folder} holds no {name}: another version of youla wrote it; identify the run again from its run.toml")
-    Kept(found)._json("summary.json")
+    kept = Kept(found)
+    kept._json("summary.json")
+    if _settings_differ(kept.settings(), kept._json("report.json").get("settings")):
+        raise InputError(f"{os.path.join(folder, 'run.toml')} was changed after the run, whose results are of other settings; identify anew, or undo the change")
     return found
+
+
+def _settings_differ(found: str, ran: str | None) -> bool:
+    """Whether settings say something else than those of the report; comments and spaces may differ."""
+    if ran is None or found == ran:
+        return False
+    try:
+        return bool(json.loads(_native.settings_json(found)) != json.loads(_native.settings_json(ran)))
+    except InputError:
+        return True
 
 
 class Kept:

@@ -130,6 +130,21 @@ def test_a_channel_is_no_array() -> None:
     assert youla.Record(table, inputs=np.array([0]), outputs=1, dt=0.01).inputs == ("u",)
 
 
+def test_a_verdict_says_which_defect_it_is(table: np.ndarray, record: youla.Record, run: youla.Run) -> None:
+    exchanged = youla.Record(table, inputs=1, outputs=0, excitation=2, dt=0.01)
+    for log, feedback, says in (
+        (record, "positive", "with the opposite sign: change feedback= between \"negative\" and \"positive\", or the sign of the outputs."),
+        (exchanged, "negative", "with inputs and outputs exchanged: u was measured and y was applied."),
+    ):
+        found = youla.identify(log, controller=2.0, feedback=feedback)
+        (defect,) = found.verdict.defects
+        assert defect.startswith(f"Defect of {log.name}: the declared controller does not explain ")
+        assert defect.endswith(says)
+        assert all(defect in shown for shown in (str(found.verdict), repr(found.verdict)))
+        assert says.rstrip(".") in str(youla.check(log, controller=2.0, feedback=feedback))
+    assert run.verdict.defects == ()
+
+
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

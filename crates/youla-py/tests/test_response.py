@@ -27,6 +27,7 @@ def loop(seed: int, repetitions: int = 0) -> tuple[np.ndarray, np.ndarray]:
 def found(data: object, **known: object) -> None:
     run = youla.identify(data, **{**KNOWN, **known})
     assert run.verdict.trusted, run.verdict
+    assert run.verdict.defects == ()
     assert run.recommended.order == 1
     assert abs(run.recommended.poles[0] - 0.95) < 2e-3
 

@@ -15,7 +15,7 @@ _WIDTH, _HEIGHT, _LEFT, _BOTTOM = 560, 240, 48, 28
 
 def page(run: Run) -> str:
     """Return the HTML of a run."""
-    lines = "".join(f"<li>{escape(line)}</li>" for line in run.verdict.lines)
+    lines = "".join(f"<li>{escape(line)}</li>" for line in (*run.verdict.lines, *run.verdict.defects))
     parts = [f"<h4>{escape(run.name)}</h4><ul>{lines}</ul>", _fits(run), _bode(run)]
     return f"<div class='youla-run'>{''.join(parts)}</div>"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -71,6 +72,15 @@ def _check_pid(limits: dict[str, Any]) -> None:
     phase = limits.get("phase_margin")
     if isinstance(phase, (int, float, np.number)) and 0 < phase < _LEAST_PHASE:
         raise InputError(f"pid['phase_margin'] is {phase:g}, but is in degrees: give at least {_LEAST_PHASE:g}, such as 40, or 0 for no limit")
+
+
+def in_python(told: str) -> str:
+    """What is said in words of run.toml and of the command line, with the arguments of this package."""
+    told = re.sub(r"`(\w+)` in \[controller\]", r"\1=", told)
+    told = re.sub(r"`--[\w-]+`, or ", "", told)
+    names = "|".join([*OPTIONS, "controller", "nominal"])
+    told = re.sub(rf"\[({names})\.(\w+)\]", r"\1={'\2': ...}", told)
+    return re.sub(rf"\[({names})\]", r"\1=", told)
 
 
 def plain(value: Any, where: str = "an option") -> Any:

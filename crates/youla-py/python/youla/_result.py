@@ -18,7 +18,7 @@ from ._model import FrequencyResponse, Mode, Model, RealPole, _model_of, frequen
 from ._names import RECOMMENDED, key_of, label_of
 from ._optional import need
 from ._pages import place_of_page
-from ._verdict import Evidence, Prediction, Verdict, VerdictTest
+from ._verdict import Evidence, Prediction, Verdict, VerdictTest, defect
 
 
 class Run:
@@ -134,14 +134,15 @@ class Run:
     def verdict(self) -> Verdict:
         """Whether the recommended model can be trusted, with the evidence."""
         lines = tuple(str(line["text"]) for line in self._page["verdict"])
+        defects = tuple(defect(f) for f in self._page.get("findings", ()) if f["status"] == "bad")
         found = self.summary["recommended"]
         if found is None:
-            return Verdict(False, (str(self.summary["refused"].get("recommended", "no model is recommended")),), (), lines)
+            return Verdict(False, (str(self.summary["refused"].get("recommended", "no model is recommended")),), (), lines, defects=defects)
         evidence = tuple(Evidence(e["question"], e["figure"], e["limit"], e["holds"]) for e in found["evidence"])
         tests = tuple(VerdictTest(**{**test, "hz": test["hz"] and tuple(test["hz"])}) for test in found["tests"])
         bands = tuple((low, high) for low, high in found["bands"])
         ratio = (found["loop_ratio"], found["loop_ratio_hz"])
-        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio, found.get("description"))
+        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio, found.get("description"), defects)
 
     @property
     def fits(self) -> dict[str, dict[str, list[float | None]]]:

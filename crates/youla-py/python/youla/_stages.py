@@ -16,7 +16,7 @@ from ._errors import InputError
 from ._identify import Records, identify, prepare, records_of
 from ._model import FrequencyResponse, Mode, Model
 from ._optional import need
-from ._options import check_options, plain
+from ._options import check_options, in_python, plain
 from ._record import Record
 from ._result import Run
 
@@ -108,7 +108,8 @@ def check(
     known = controller is not None
     settings, logs = prepare(record, None, nominal, controller if known else 0, feedback, hold, None, options)
     found = json.loads(_native.check(settings, logs, known))
-    return Check(tuple(found["findings"]), found["defects"], found["cautions"], found["notes"])
+    findings = tuple({**f, "advice": in_python(f["advice"])} for f in found["findings"])
+    return Check(findings, found["defects"], found["cautions"], found["notes"])
 
 
 def _first(record: Records) -> Record:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from ._arrays import Array
+from ._options import in_python
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,8 @@ class Verdict:
         The part of the margin of the loop that the 95 % region takes, and where; ``None`` for an open loop.
     description : bool or None
         Whether the description of the loop agrees with the log, whatever the model is worth; ``None`` where nothing could be asked.
+    defects : tuple of str
+        What is wrong with the records or the stated controller, as `check` says it, with the remedy.
     """
 
     trusted: bool
@@ -82,16 +86,18 @@ class Verdict:
     loop_ratio: float | None = None
     loop_ratio_hz: float | None = None
     description: bool | None = None
+    defects: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return self.trusted
 
     def __str__(self) -> str:
-        return "\n".join(self.lines)
+        return "\n".join([*self.lines, *self.defects])
 
     def __repr__(self) -> str:
         counts = [f"{sum(t.outcome == o for t in self.tests)} {o.replace('-', ' ')}" for o in ("passed", "failed", "not-tested")]
-        shown = [f"  {reason}" for reason in self.reasons[:6]] + (["  ..."] if len(self.reasons) > 6 else [])
+        causes = [*self.defects[:2], *self.reasons[:5]]
+        shown = [f"  {cause}" for cause in causes] + (["  ..."] if len(causes) < len(self.defects) + len(self.reasons) else [])
         return "\n".join([f"<youla.Verdict: {'trusted' if self.trusted else 'not trusted'}; tests: {', '.join(counts)}>", *shown])
 
 
@@ -106,3 +112,10 @@ class Prediction:
     def __repr__(self) -> str:
         n, p = self.measured.shape
         return f"<youla.Prediction {self.record!r}: {n} samples of {p} outputs, by {', '.join(self.predicted)}>"
+
+
+def defect(finding: dict[str, Any]) -> str:
+    """A defect of the report in a sentence with its remedy."""
+    where = " ".join(str(finding[key]) for key in ("record", "channel") if finding.get(key))
+    advice = in_python(finding["advice"]).rstrip(".")
+    return f"Defect of {where or 'the records'}: {finding['what']}.{f' {advice}.' if advice else ''}"

@@ -379,6 +379,9 @@ def _plain(name: str) -> str:
 def _signal(values: Any, what: str, channels: int) -> Array:
     """A signal, samples x channels; one channel may be a list."""
     array = as_floats(values, what)
+    if array.ndim == 0:
+        made = f"numpy.random.default_rng(1).standard_normal((samples, {channels}))" if what == "noise" else f"numpy.ones((samples, {channels}))"
+        raise InputError(f"{what} is the number {array:g}, but must be a signal, samples x {channels}; give {array:g} * {made}")
     array = array.reshape(-1, 1) if array.ndim == 1 and channels == 1 else array
     if array.ndim != 2 or array.shape[1] != channels:
         found = " x ".join(map(str, array.shape))

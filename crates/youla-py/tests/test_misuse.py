@@ -145,6 +145,24 @@ def test_a_verdict_says_which_defect_it_is(table: np.ndarray, record: youla.Reco
     assert run.verdict.defects == ()
 
 
+@pytest.mark.parametrize(("name", "place"), [("export", "youla export folder --to c"), ("commission", "youla commission campaign.toml"), ("plot", "run.plot.bode()")])
+def test_what_is_elsewhere_is_named(name: str, place: str) -> None:
+    with pytest.raises(AttributeError, match=f"module 'youla' has no attribute '{name}'; ") as told:
+        getattr(youla, name)
+    assert place in str(told.value)
+    with pytest.raises(AttributeError, match="has no attribute 'nowhere'$"):
+        _ = youla.nowhere
+
+
+def test_a_number_is_no_signal(nominal: youla.Model) -> None:
+    for signal, says in (
+        ("noise", r"^noise is the number 0.01, but must be a signal, samples x 1; give 0.01 \* numpy.random.default_rng\(1\).standard_normal\(\(samples, 1\)\)$"),
+        ("reference", r"^reference is the number 0.01, .*; give 0.01 \* numpy.ones\(\(samples, 1\)\)$"),
+    ):
+        with pytest.raises(youla.InputError, match=says):
+            youla.simulate_loop(nominal, 2.0, feedback="negative", samples=100, **{signal: 0.01})
+
+
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

@@ -6,6 +6,8 @@
 (True, 2)
 """
 
+from typing import TYPE_CHECKING
+
 from . import _native
 from ._channels import Channels, ChannelTiming, Synchronised
 from ._compare import Comparison, compare
@@ -26,6 +28,9 @@ from ._verdict import Evidence, Prediction, Verdict, VerdictTest
 from ._workbench import workbench
 
 __version__ = _native.version()
+
+if not TYPE_CHECKING:  # a type checker knows the names that there are
+    from ._elsewhere import absent as __getattr__
 
 __all__ = [
     "Bootstrap",

@@ -145,6 +145,33 @@ def test_a_verdict_says_which_defect_it_is(table: np.ndarray, record: youla.Reco
     assert run.verdict.defects == ()
 
 
+#: Controllers and options of identify, with what they are told.
+ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
+    "numerator and denominator": ({"controller": ([1, 2], [1, 3])}, r"of a numerator and a denominator give control.tf\(numerator, denominator, dt\)$"),
+    "ragged": ({"controller": ([2.0], [1, -0.5])}, r"controller is a tuple, .*; of a numerator and a denominator give control.tf"),
+    "three gains": ({"controller": [127, 381, 3.81]}, r"a gain of 1 x 3, but must be 1 x 1; of the gains of a PID give \{'pid': \{'kp': 127, 'ki': 381, 'kd': 3.81, 'discretisation': 'tustin'\}\}, or"),
+    "gains without a form": ({"controller": {"kp": 127.0, "ki": 2}}, r"but has \['kp', 'ki'\]; give \{'pid': \{'kp': 127.0, 'ki': 2\}\}$"),
+    "discretisation": ({"controller": {"pid": {"kp": 2.0}}}, r"controller\['pid'\] lacks 'discretisation'; give 'backward-euler' \(backward differences\) or 'tustin'"),
+    "order 0": ({"recommended": {"order": 0}}, r"^recommended\['order'\] is 0, but must be a whole number of at least 1, or 'auto'$"),
+    "order -1": ({"recommended": {"order": -1}}, r"^recommended\['order'\] is -1, but must be a whole number of at least 1, or 'auto'$"),
+    "order -1 of hansen": ({"hansen": {"order": -1}}, r"^hansen\['order'\] is -1, but must be a whole number of at least 1, or 'auto'$"),
+    "order beyond the record": ({"recommended": {"order": 1000}}, r"4000 samples are too few.*; or ask for a lower order than recommended\['order'\] = 1000$"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_an_argument_of_identify_is_refused_with_what_is_meant(case: str, record: youla.Record) -> None:
+    given, says = ARGUMENTS[case]
+    with pytest.raises(youla.InputError, match=says):
+        youla.identify(record, **{**KNOWN, **given})
+
+
+@pytest.mark.parametrize("order", [0, -1])
+def test_the_order_of_a_subspace_estimate(record: youla.Record, order: int) -> None:
+    with pytest.raises(youla.InputError, match=f"^order is {order}, but must be a whole number of at least 1, or 'auto'$"):
+        youla.subspace(record, order=order)
+
+
 @pytest.mark.parametrize(("name", "place"), [("export", "youla export folder --to c"), ("commission", "youla commission campaign.toml"), ("plot", "run.plot.bode()")])
 def test_what_is_elsewhere_is_named(name: str, place: str) -> None:
     with pytest.raises(AttributeError, match=f"module 'youla' has no attribute '{name}'; ") as told:

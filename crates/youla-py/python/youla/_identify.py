@@ -12,7 +12,7 @@ from . import _native
 from ._arrays import Array, whole
 from ._channels import Channels, Synchronised
 from ._checks import file_of, text
-from ._errors import InputError
+from ._errors import InputError, NumericalError
 from ._gaps import refuse_not_finite
 from ._model import FrequencyResponse, _numbered
 from ._options import check_options, plain
@@ -102,7 +102,16 @@ def identify(
     assert not isinstance(record, (Response, FrequencyResponse))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
     _check_moves(records_of(record, "record"))
-    return Run(_native.identify(settings, logs))
+    try:
+        return Run(_native.identify(settings, logs))
+    except (InputError, NumericalError) as error:
+        raise type(error)(f"{error}{_of_order(str(error), options)}") from None
+
+
+def _of_order(told: str, options: Mapping[str, Any]) -> str:
+    """Of records that are too short for an order that was asked for: the order."""
+    order = options.get("recommended", {}).get("order")
+    return f"; or ask for a lower order than recommended['order'] = {order}" if isinstance(order, int) and "too few" in told else ""
 
 
 def _of_response(

@@ -27,6 +27,9 @@ _ARGUMENTS = {
     "identify_many": ("nominal", "controller", "feedback", "hold", "name", "read", "executor", "folder", "progress"),
 }
 
+#: Tables of models with an order that is identified.
+_IDENTIFIED = ("recommended", "hansen", "direct")
+
 #: Keys of [redesign] that a structure does not use.
 _WITHOUT_STRUCTURE = ("method", "input_weights", "peak_sensitivity")
 
@@ -43,8 +46,16 @@ def check_options(options: Mapping[str, Any], function: str) -> None:
     for key, given in options.items():
         if not isinstance(given, Mapping):
             raise InputError(f"{key} is {type(given).__name__}, but must be a mapping as the table [{key}] of run.toml")
+        if key in _IDENTIFIED:
+            check_order(given.get("order"), f"{key}['order']")
     if "redesign" in options:
         check_redesign(options["redesign"], "redesign")
+
+
+def check_order(order: Any, what: str) -> None:
+    """Refuse an order below 1; other values are told by the key that they are of."""
+    if isinstance(order, (int, np.integer)) and not isinstance(order, bool) and order < 1:
+        raise InputError(f"{what} is {order}, but must be a whole number of at least 1, or 'auto'")
 
 
 def check_redesign(options: Mapping[str, Any], function: str) -> None:

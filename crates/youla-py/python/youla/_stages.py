@@ -16,7 +16,7 @@ from ._errors import InputError
 from ._identify import Records, identify, prepare, records_of
 from ._model import FrequencyResponse, Mode, Model
 from ._optional import need
-from ._options import check_options, in_python, plain
+from ._options import check_options, check_order, in_python, plain
 from ._record import Record
 from ._result import Run
 
@@ -194,6 +194,7 @@ def subspace(record: Records, **options: Any) -> SubspaceEstimate:
     >>> round(float(youla.subspace(log, order=1, horizon=5).model.a[0, 0]), 3)
     0.8
     """
+    check_order(options.get("order"), "order")
     settings, logs = prepare(record, None, None, 0, None, None, None, {})
     return SubspaceEstimate(_native.subspace(settings, logs, plain(options)), _first(record))
 

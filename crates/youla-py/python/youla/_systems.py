@@ -39,6 +39,8 @@ def controller_table(controller: Any, feedback: str | None, hold: str | None, dt
     if isinstance(controller, Mapping):
         found = _named(controller, CONTROLLERS, "controller")
         ((form, table),) = found.items()
+        if form in ("pid", "ideal_pid") and "discretisation" not in table:
+            raise InputError(f"controller[{form!r}] lacks 'discretisation'; give 'backward-euler' (backward differences) or 'tustin', as the machine computes it")
         return {form: {"feedback": feedback, **table}}
     if isinstance(controller, (str, os.PathLike)):
         return {"model_file": {"feedback": feedback, "file": os.path.abspath(file_of(controller, "controller"))}}
@@ -117,7 +119,7 @@ def _numbers(system: Any, what: str) -> Any:
     try:
         gain = as_matrix(system, what)
     except InputError:
-        remedy = "; of a youla.Run give run.recommended or run.model('controller')" if hasattr(system, "recommended") else ""
+        remedy = "; of a youla.Run give run.recommended or run.model('controller')" if hasattr(system, "recommended") else _meant(system)
         kinds = "a youla.Model, a python-control or SciPy system, a number, a matrix, a mapping as in run.toml, or a file"
         raise InputError(f"{what} is a {type(system).__name__}, but must be {kinds}{remedy}") from None
     if not np.isfinite(gain).all():
@@ -125,9 +127,22 @@ def _numbers(system: Any, what: str) -> Any:
     return gain
 
 
+def _meant(system: Any) -> str:
+    """What lists of numbers may mean that are no gains of the loop."""
+    if not isinstance(system, (list, tuple)):
+        return ""
+    if len(system) == 2 and all(isinstance(x, (list, tuple, np.ndarray)) for x in system):
+        return "; of a numerator and a denominator give control.tf(numerator, denominator, dt)"
+    if len(system) == 3 and all(isinstance(x, (int, float)) for x in system):
+        gains = {**dict(zip(("kp", "ki", "kd"), system, strict=True)), "discretisation": "tustin"}
+        return f"; of the gains of a PID give {{'pid': {gains}}}, or 'backward-euler' where the machine computes backward differences"
+    return ""
+
+
 def _named(table: Mapping[str, Any], forms: tuple[str, ...], what: str) -> Table:
     if len(table) != 1 or next(iter(table)) not in forms:
-        raise InputError(f"{what} as a mapping must have exactly one key of {', '.join(forms)}, but has {list(table)}")
+        remedy = f"; give {{'pid': {dict(table)!r}}}" if "kp" in table and what == "controller" else ""
+        raise InputError(f"{what} as a mapping must have exactly one key of {', '.join(forms)}, but has {list(table)}{remedy}")
     form, inner = next(iter(table.items()))
     if not isinstance(inner, Mapping):
         raise InputError(f"{what}[{form!r}] is {type(inner).__name__}, but must be a mapping as run.toml has it")
@@ -220,5 +235,5 @@ def _gain(system: Any, ports: tuple[int, int], what: str) -> Table:
         gain = np.full(ports, gain[0, 0]) if ports == (1, 1) or gain[0, 0] == 0 else gain
     if gain.shape != ports:
         found = " x ".join(map(str, gain.shape))
-        raise InputError(f"{what} is a gain of {found}, but must be {ports[0]} x {ports[1]}")
+        raise InputError(f"{what} is a gain of {found}, but must be {ports[0]} x {ports[1]}{_meant(system)}")
     return _matrices(np.zeros((0, 0)), [], [], gain, "discrete")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -188,6 +189,20 @@ def test_a_number_is_no_signal(nominal: youla.Model) -> None:
     ):
         with pytest.raises(youla.InputError, match=says):
             youla.simulate_loop(nominal, 2.0, feedback="negative", samples=100, **{signal: 0.01})
+
+
+def test_machines_with_other_channels_are_named(run: youla.Run, tmp_path: Path) -> None:
+    levitation, bearing = youla.demo(), youla.demo("bearing")
+    with pytest.raises(youla.InputError, match=r"runs\[1\] has the inputs u_h, u_v and the outputs y_h, y_v, but runs\[0\] has the inputs u and the outputs y; "):
+        youla.compare([run, bearing.save(tmp_path / "bearing")])
+    renamed = youla.Record(loop(2), inputs=0, outputs=1, excitation=2, dt=0.01, name="log").to_frame()
+    other = youla.identify(youla.Record(renamed.set_axis(["torque", "pos", "d"], axis=1), inputs="torque", outputs="pos", excitation="d", time="index"), **KNOWN)
+    with pytest.warns(UserWarning, match=r"runs\[1\] has the inputs torque and the outputs pos, but runs\[0\] has the inputs u and"):
+        found = youla.compare([run, other])
+    assert {"from", "to", "nu_gap"} <= found.distances[0].keys()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        youla.compare([levitation, levitation])
 
 
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:

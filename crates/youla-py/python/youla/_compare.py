@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,15 @@ from ._result import Run
 
 @dataclass(frozen=True)
 class Comparison:
-    """Names of runs, and the nu-gap of each pair: ``first``, ``second`` and the distance."""
+    """Names of runs, and the distance of each pair.
+
+    Attributes
+    ----------
+    runs : tuple of str
+        Names of the runs.
+    distances : tuple of dict
+        ``from`` and ``to``, names of two runs; ``nu_gap``, 0 to 1, or None, and then ``refusal`` says why.
+    """
 
     runs: tuple[str, ...]
     distances: tuple[dict[str, Any], ...]
@@ -52,7 +61,8 @@ def compare(
     Raises
     ------
     InputError
-        For fewer than two runs, a folder without the model, and a page in the place of a file that youla did not write.
+        For fewer than two runs, runs with other numbers of channels, a folder without the model, and a page in the place of a file that youla
+        did not write. Channels of other names are a warning.
 
     Examples
     --------
@@ -71,6 +81,33 @@ def compare(
             run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
             for k, run in enumerate(runs)
         ]
+        _same_channels([_channels(place) for place in paths])
         # Run folders name the recommended model by its file.
         found = json.loads(_native.compare(paths, label_of(model), place))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))
+
+
+def _channels(folder: str) -> dict[str, list[str]] | None:
+    """Names of inputs and outputs of a run folder; `None` for what is none, which the comparison refuses."""
+    try:
+        with open(os.path.join(folder, "1-record/records.json"), encoding="utf-8") as file:
+            found = json.load(file)
+        return {group: [channel["name"] for channel in found[group]] for group in ("inputs", "outputs")}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _same_channels(runs: list[dict[str, list[str]] | None]) -> None:
+    """Refuse runs with other numbers of channels, and warn of other names: they may be another machine."""
+    first = runs[0] if runs else None
+    for k, other in enumerate(runs):
+        if first is None or other is None or first == other:
+            continue
+        told = f"runs[{k}] has {_in_words(other)}, but runs[0] has {_in_words(first)}; compare runs of one machine"
+        if any(len(first[group]) != len(other[group]) for group in first):
+            raise InputError(told)
+        warnings.warn(f"{told}, or give the channels one name in all records", stacklevel=3)
+
+
+def _in_words(channels: dict[str, list[str]]) -> str:
+    return " and ".join(f"the {group} {', '.join(names)}" for group, names in channels.items())

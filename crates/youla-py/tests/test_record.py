@@ -134,6 +134,27 @@ def test_an_array_that_was_changed_is_refused() -> None:
     youla.check(part)
 
 
+def test_a_counter_that_wrapped_is_refused(tmp_path: Path) -> None:
+    """An encoder of 16 bits in a move over its range; a binary excitation of the whole range and a full-scale ramp that stays are none."""
+    rng = np.random.default_rng(1)
+    angle = np.cumsum(300 * rng.standard_normal(4000) + 40)
+    wrapped, prbs = angle.astype(np.int64).astype(np.int16), (rng.integers(0, 2, 4000) * 255 - 128).astype(np.int8)
+    assert np.abs(np.diff(wrapped.astype(int))).max() > 60000
+    told = r"jumps by about 65536 at row \d+, counted from 0, where its counter wrapped; give numpy.unwrap\(column.astype\(float\), period=65536\)"
+    for data in ({"u": prbs, "y": wrapped}, {"u": prbs, "y": wrapped.astype(np.int64)}, {"u": prbs, "y": wrapped.astype(np.uint16)}):
+        with pytest.raises(youla.InputError, match=f"channel 'y' {told}"):
+            youla.Record(data, inputs="u", outputs="y", dt=0.01)
+    with pytest.raises(youla.InputError, match=f"column 0 {told}"):
+        youla.Record(np.column_stack([wrapped, wrapped]), inputs=1, outputs=0, dt=0.01)
+    np.savetxt(tmp_path / "log.csv", np.column_stack([prbs, wrapped]), delimiter=",", header="u,y", comments="", fmt="%d")
+    with pytest.raises(youla.InputError, match=f"channel 'y' {told}"):
+        youla.Record(tmp_path / "log.csv", inputs="u", outputs="y", dt=0.01)
+    mended = np.unwrap(wrapped.astype(float), period=65536)
+    assert np.ptp(np.diff(mended)) < 5000
+    for good in (mended, np.arange(4000, dtype=np.int16), np.linspace(-32768, 32767, 4000).astype(np.int16), (2e4 * rng.standard_normal(4000)).clip(-32768, 32767).astype(np.int16)):
+        youla.Record({"u": prbs, "y": good}, inputs="u", outputs="y", dt=0.01)
+
+
 def test_cuts_are_records(record: youla.Record) -> None:
     first, second = record.split(0.25)
     assert (first.samples, second.samples) == (1000, 3000)

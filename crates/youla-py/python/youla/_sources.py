@@ -16,6 +16,7 @@ from ._checks import file_of, kind, path_of
 from ._errors import InputError
 from ._gaps import refuse_masked
 from ._optional import need
+from ._wrapped import refuse_wrapped
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def source_of(data: Any, chosen: dict[str, list[str | int]], time: str | int | N
         return _of_columns({name: data[name].to_numpy() for name in _needed(data.columns, chosen, time)}, time, dt)
     if isinstance(data, Mapping):
         return _of_columns({name: data[name] for name in _needed(list(data), chosen, time)}, time, dt)
-    return _of_array(data, time, dt)
+    return _of_array(data, chosen, time, dt)
 
 
 def _is(data: Any, module: str, name: str) -> bool:
@@ -105,7 +106,7 @@ def _clock(times: Any, dt: float | None, what: str, column: Any = "", turned: st
     return _native.clock(what, np.ascontiguousarray(seconds), dt)
 
 
-def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
+def _of_array(data: Any, chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None) -> Source:
     refuse_masked(data, "data")
     array = as_floats(data, "data")
     if array.ndim == 0:
@@ -124,6 +125,9 @@ def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
         if not 0 <= time < array.shape[1]:
             raise InputError(f"time is column {time}, but data has columns 0 to {array.shape[1] - 1}")
         times = array[:, time]
+    used = {place for places in chosen.values() for place in places if isinstance(place, (int, np.integer)) and 0 <= place < array.shape[1]}
+    for place in sorted(used):
+        refuse_wrapped(np.asarray(data)[:, place], f"column {place}")
     empty = [""] * array.shape[1]
     return Source(array, _clock(times, dt, "time"), empty, list(empty))
 
@@ -131,6 +135,8 @@ def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
 def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | None) -> Source:
     for name, values in columns.items():
         refuse_masked(values, f"channel {name!r}")
+        if name != time:
+            refuse_wrapped(values, f"channel {name!r}")
     arrays = {name: as_floats(values, f"channel {name!r}") for name, values in columns.items()}
     for name, array in arrays.items():
         if array.ndim != 1:
@@ -236,6 +242,10 @@ def _of_file(
     if os.path.isdir(path):
         raise InputError(f"data is the folder {os.fspath(path)}, but a record is one file; give youla.identify_many its files")
     data, found, _ = _native.read_log(os.fspath(path), channels, clock, dt)
+    for column, (name, _, _) in zip(data.T, channels, strict=True):
+        # Text says nothing of types.
+        if np.array_equal(column, np.rint(column)) and np.abs(column).max(initial=0.0) < 2**53:
+            refuse_wrapped(column.astype(np.int64), f"channel {name!r}")
     source = _File(data, found, ["" if isinstance(p, int) else p for p in places], [""] * len(places))
     source.places.extend(places)
     return source

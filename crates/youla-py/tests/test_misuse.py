@@ -205,6 +205,46 @@ def test_machines_with_other_channels_are_named(run: youla.Run, tmp_path: Path) 
         youla.compare([levitation, levitation])
 
 
+PIDS: dict[str, dict[str, Any]] = {
+    "backward": {"pid": {"kp": 2.0, "ki": 3.0, "kd": 0.01, "derivative_filter": 0.02, "discretisation": "backward-euler"}},
+    "tustin": {"pid": {"kp": 2.0, "ki": 3.0, "kd": 0.01, "derivative_filter": 0.02, "discretisation": "tustin", "delay": 2}},
+    "ideal": {"ideal_pid": {"kp": 2.0, "ti": 0.5, "td": 0.01, "derivative_filter": 0.02, "discretisation": "tustin"}},
+    "ideal without an integral": {"ideal_pid": {"kp": 2.0, "td": 0.01, "discretisation": "backward-euler", "delay": 1}},
+}
+
+
+@pytest.mark.parametrize("form", PIDS)
+def test_a_pid_in_a_loop_is_that_of_identify(form: str, record: youla.Record) -> None:
+    run = youla.identify(record, controller=PIDS[form], feedback="negative")
+    theirs = youla.certify(run.recommended, run.model("controller"), feedback="positive")
+    ours = youla.certify(run.recommended, PIDS[form], feedback="negative")
+    assert (ours.stable, ours.peak_sensitivity) == (theirs.stable, pytest.approx(theirs.peak_sensitivity, rel=1e-9))
+    assert np.allclose(np.sort_complex(ours.poles), np.sort_complex(theirs.poles), atol=1e-6)
+
+
+def test_pids_of_several_loops_and_files_in_a_loop(nominal: youla.Model, tmp_path: Path) -> None:
+    plant = youla.Model(np.diag([0.95, 0.9]), 0.1 * np.eye(2), np.eye(2), np.zeros((2, 2)), dt=0.01)
+    both = youla.certify(plant, {"pid": {"kp": [2.0, 1.0], "ki": [1.0, 0.0], "discretisation": "tustin"}}, feedback="negative")
+    alone = [
+        youla.certify(youla.Model([[a]], [[0.1]], [[1]], [[0]], dt=0.01), {"pid": {"kp": kp, "ki": ki, "discretisation": "tustin"}}, feedback="negative").poles
+        for a, kp, ki in ((0.95, 2.0, 1.0), (0.9, 1.0, 0.0))
+    ]
+    assert np.allclose(np.sort_complex(both.poles), np.sort_complex(np.concatenate(alone)))
+    youla.Model([], [], [], 2.0, dt=0.01).save(tmp_path / "k.json")
+    nominal.save(tmp_path / "g.json")
+    found = youla.certify(tmp_path / "g.json", str(tmp_path / "k.json"), feedback="negative")
+    assert found.poles.tolist() == youla.certify(nominal, 2.0, feedback="negative").poles.tolist()
+    (tmp_path / "k.csv").write_text("t,u")
+    for call, says in (
+        (lambda: youla.certify(nominal, str(tmp_path / "k.csv"), feedback="negative"), "k.csv, which holds no model .*; give a file that model.save wrote"),
+        (lambda: youla.certify(PIDS["tustin"], 2.0, feedback="negative"), "plant is a mapping, of which the sample time is not known"),
+        (lambda: youla.certify(nominal, {"pid": {"kp": 2, "discretisation": "zoh"}}, feedback="negative"), "the choices are backward-euler, tustin"),
+        (lambda: youla.certify(nominal, {"transfer_function": {}}, feedback="negative"), "is made a model by identify only; give a youla.Model, control.tf"),
+    ):
+        with pytest.raises(youla.InputError, match=says):
+            call()
+
+
 def test_a_redesign_asked_for_before_is_checked_alike(record: youla.Record) -> None:
     with pytest.raises(youla.InputError, match="peak_sensitivity is not used with structure='pid'"):
         youla.identify(record, controller=2.0, feedback="negative", redesign={"structure": "pid", "peak_sensitivity": 1.1})

@@ -116,7 +116,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "function as controller": (lambda: ident(controller=lambda y: y), "controller is a function, but must be a youla.Model"),
     "model file": (lambda: ident(nominal="nominal.json"), "nominal.json: no such file; nominal is read from the folder"),
     "empty path": (lambda: ident(nominal=""), "nominal is '', but must be a path"),
-    "plant as text": (lambda: youla.certify("g", 1.0), "plant is a str, but must be a youla.Model"),
+    "plant as text": (lambda: youla.certify("g", 1.0), "g: no such file; plant is read from the folder"),
     "plant of another dt": (lambda: youla.certify(NOMINAL, control.ss([], [], [], 2.0, 0.02)), "but the plant has 0.01 s"),
     "names of a model": (lambda: youla.Model(0.5, 1, 1, 0, dt=1, inputs=3), "inputs is 3, but must be a list of names"),
     "empty d": (lambda: youla.Model([], [], [], [], dt=1), "d is empty"),

@@ -73,7 +73,8 @@ def certify(plant: Any, controller: Any, *, feedback: str | None = None) -> Cert
     Parameters
     ----------
     plant, controller : Model or discrete-time system of python-control or SciPy
-        The controller may also be a gain.
+        Also the path of a file that `Model.save` wrote. The controller may also be a gain, or a PID as `identify` takes it,
+        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``.
     feedback : {"negative", "positive"}
         Sign with which the controller is written.
 
@@ -116,7 +117,7 @@ def simulate_loop(
     Parameters
     ----------
     plant, controller : Model or discrete-time system of python-control or SciPy
-        The controller may also be a gain, m x p.
+        As for `certify`; a gain is m x p.
     feedback : {"negative", "positive"}
         Sign with which the controller is written.
     samples : int, optional

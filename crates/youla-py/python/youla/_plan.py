@@ -206,7 +206,7 @@ def study(
     plant : Run, Model, or discrete-time system of python-control or SciPy
         The simulated machine. Of a run, the recommended model with its noise.
     controller : Model or discrete-time system of python-control or SciPy
-        The controller, or a gain, m x p; ``"own"`` is that of the run.
+        The controller as for `certify`, or a gain, m x p; ``"own"`` is that of the run.
     conditions : sequence of mapping
         Arguments of `excite` for each experiment: ``amplitude``, ``band``, ``seconds`` or ``samples``, ``shape`` and so on.
     n : int

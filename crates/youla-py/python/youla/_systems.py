@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from . import _native
 from ._arrays import as_matrix
 from ._checks import choice, file_of, kind
 from ._errors import InputError
 from ._model import Model
 from ._optional import need
+from ._options import plain
+from ._pid import pid_model
 from ._sources import _is
 
 Table = dict[str, Any]
@@ -37,10 +41,7 @@ def controller_table(controller: Any, feedback: str | None, hold: str | None, dt
     feedback = sign_of(controller, feedback)
     check_hold(hold)
     if isinstance(controller, Mapping):
-        found = _named(controller, CONTROLLERS, "controller")
-        ((form, table),) = found.items()
-        if form in ("pid", "ideal_pid") and "discretisation" not in table:
-            raise InputError(f"controller[{form!r}] lacks 'discretisation'; give 'backward-euler' (backward differences) or 'tustin', as the machine computes it")
+        form, table = _form(controller)
         return {form: {"feedback": feedback, **table}}
     if isinstance(controller, (str, os.PathLike)):
         return {"model_file": {"feedback": feedback, "file": os.path.abspath(file_of(controller, "controller"))}}
@@ -52,6 +53,14 @@ def controller_table(controller: Any, feedback: str | None, hold: str | None, dt
     elif hold is not None:
         raise InputError("hold is for a controller in continuous time, but this one is in discrete time; leave hold out")
     return {form: {"feedback": feedback, **table}}
+
+
+def _form(controller: Mapping[str, Any]) -> tuple[str, Table]:
+    """The form of a controller with its keys."""
+    ((form, table),) = _named(controller, CONTROLLERS, "controller").items()
+    if form in ("pid", "ideal_pid") and "discretisation" not in table:
+        raise InputError(f"controller[{form!r}] lacks 'discretisation'; give 'backward-euler' (backward differences) or 'tustin', as the machine computes it")
+    return form, table
 
 
 class UnstatedSign(InputError):
@@ -83,9 +92,15 @@ def check_hold(hold: Any) -> None:
 
 
 def as_model(system: Any, what: str, dt: float | None = None) -> Model:
-    """Return a discrete-time model of a Model, a python-control or SciPy system in discrete time, or a gain."""
+    """Return a discrete-time model of a Model, a python-control or SciPy system in discrete time, a gain or a file; with `dt`, of a PID too."""
     if isinstance(system, Model):
         return system
+    if isinstance(system, Mapping):
+        if dt is None:
+            raise InputError(f"{what} is a mapping, of which the sample time is not known; give a youla.Model or a discrete-time system of python-control")
+        return _of_mapping(system, dt)
+    if isinstance(system, (str, os.PathLike)):
+        return _of_file(system, what)
     if _is(system, "scipy.signal", "lti"):
         raise InputError(f"{what} states no sample time, being in continuous time; discretise it first by to_discrete(dt)")
     known = _is(system, "control", "LTI") or _is(system, "scipy.signal", "dlti")
@@ -101,6 +116,37 @@ def as_model(system: Any, what: str, dt: float | None = None) -> Model:
     if _domain(system, what) == "continuous":
         raise InputError(f"{what} is in continuous time; discretise it first, for example with control.c2d(system, dt)")
     return Model(system.A, system.B, system.C, system.D, dt=float(dt))
+
+
+def _of_mapping(controller: Mapping[str, Any], dt: float) -> Model:
+    """A controller that `identify` takes as a mapping, as it is written."""
+    form, table = _form(controller)
+    if form == "model_file" and "file" in table:
+        return _of_file(table["file"], "controller['model_file']['file']")
+    if form not in ("pid", "ideal_pid"):
+        raise InputError(
+            f"controller[{form!r}] is made a model by identify only; give a youla.Model, control.tf(...), or run.model('controller') with feedback='positive'"
+        )
+    names = [str(k) for k in range(max((np.size(value) for value in table.values()), default=1))]
+    ports = {group: [{"name": f"{letter}{k}"} for k in names] for group, letter in (("inputs", "u"), ("outputs", "y"))}
+    data = {"sample_time": dt, **ports, "estimation": [{"file": "none"}]}
+    _native.check_settings(plain({"name": "loop", "data": data, "controller": {form: {"feedback": "negative", **table}}}))
+    return pid_model(form, table, dt)
+
+
+def _of_file(path: Any, what: str) -> Model:
+    """A model that `Model.save` wrote, or one of a run folder."""
+    place = file_of(path, what)
+    with open(place, "rb") as file:
+        content = file.read()
+    try:
+        found = _native.read_mat(content, place) if place.endswith(".mat") else json.loads(content)
+        d, n = as_matrix(found["d"], "d"), len(found["a"])
+        shapes = {"a": (n, n), "b": (n, d.shape[1]), "c": (d.shape[0], n)}
+        a, b, c = (np.reshape(as_matrix(found[key], key), shape) for key, shape in shapes.items())
+        return Model(a, b, c, d, dt=float(np.ravel(found["ts"])[0]), name=os.path.basename(place))
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{what} is {place}, which holds no model ({error}); give a file that model.save wrote") from None
 
 
 def _state_space(system: Any, what: str) -> Any:

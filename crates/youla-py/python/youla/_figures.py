@@ -103,7 +103,7 @@ class Plots:
         """Frequencies in Hz, loop gain of each output with all other loops closed, G K, and the response of the model."""
         if text(model, "model") in NO_PLANTS:
             plants = [key for key in self._run.models if key not in NO_PLANTS]
-            raise InputError(f"model {model!r} is no plant, which the controller would control; choose of {', '.join(plants)}")
+            raise InputError(f"model {model!r} is no plant of the loop; choose of {', '.join(plants)}")
         found = self._run.frequency_response(omega, model=model)
         k = self._run.model("controller").frequency_response(found.omega).values
         if not np.any(k):

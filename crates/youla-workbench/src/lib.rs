@@ -15,7 +15,8 @@
 //! | `draw` | `run` | draws plants from the region of a run folder, for `loop` |
 //! | `loop` | `run`, `controller` | S, step and locus of a controller on the region of a run |
 //! | `compare` | `runs` | a page of two runs |
-//! | `archive` | `run` | the run folder as one zip file |
+//! | `archive` | `run`, `file` | the run folder as one zip file |
+//! | `unpack` | `file`, `out` | the run folder of a zip file |
 //!
 //! A refusal is `{"error": "a sentence", "exit": 2}`, with the exit codes of the program.
 //!
@@ -25,10 +26,12 @@
 //! | `log` | columns and their suggested roles |
 //! | `traces` | outlines, spectra, coherence |
 //! | `run` | check, identification, comparison |
+//! | `archive` | a run folder as one file, and back |
 //! | `orders` | the stabilisation chart |
 //! | `gains` | the predicted loop |
 //! | `page` | the HTML file |
 
+mod archive;
 mod gains;
 mod log;
 mod orders;

@@ -1,7 +1,7 @@
 //! Requests and their answers.
 
 use crate::refusal::{Refusal, Result};
-use crate::{gains, log, orders, run, traces};
+use crate::{archive, gains, log, orders, run, traces};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -24,6 +24,7 @@ enum Request {
     Loop { run: PathBuf, controller: Option<ControllerSettings> },
     Compare { runs: [PathBuf; 2] },
     Archive { run: PathBuf, file: PathBuf },
+    Unpack { file: PathBuf, out: PathBuf },
 }
 
 /// Answers a request as JSON; `announce` is called with the name of each stage of a run as it begins.
@@ -56,6 +57,7 @@ fn of(request: Request, announce: &mut dyn FnMut(&str)) -> Result<Value> {
         Request::Draw { run } => gains::keep(&run),
         Request::Loop { run, controller } => gains::predicted(&run, controller.as_ref()),
         Request::Compare { runs } => run::compare(&runs),
-        Request::Archive { run, file } => run::archive(&run, &file),
+        Request::Archive { run, file } => archive::archive(&run, &file),
+        Request::Unpack { file, out } => archive::unpack(&file, &out),
     }
 }

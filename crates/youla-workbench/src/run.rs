@@ -1,14 +1,11 @@
 //! Check, identification and comparison, as the program does them.
 
-use crate::refusal::{Refusal, Result};
+use crate::refusal::Result;
 use serde_json::{Value, json};
-use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use youla_io::folder::{RunFolder, files_below};
+use youla_io::folder::RunFolder;
 use youla_loop::check::Finding;
 use youla_run::{Stage, StageClock, check_run, parse_settings, read_records, write_into};
-use zip::write::SimpleFileOptions;
 
 /// The name of the settings in messages.
 const SETTINGS: &str = "run.toml";
@@ -46,18 +43,4 @@ pub(crate) fn identify(toml: &str, out: &Path, announce: &mut dyn FnMut(&str)) -
 pub(crate) fn compare(runs: &[PathBuf; 2]) -> Result<Value> {
     let found = youla_run::compare(runs, "recommended")?;
     Ok(json!({ "html": youla_report::html(&found.report)? }))
-}
-
-/// Packs a run folder into one file.
-pub(crate) fn archive(run: &Path, file: &Path) -> Result<Value> {
-    let io = |source| Refusal::at(run, source);
-    let mut archive = zip::ZipWriter::new(fs::File::create(file).map_err(|source| Refusal::at(file, source))?);
-    let zipped = |e: zip::result::ZipError| Refusal::Text(format!("{}: {e}", file.display()));
-    for name in files_below(run).map_err(io)? {
-        let path = run.join(name);
-        archive.start_file(path.to_string_lossy(), SimpleFileOptions::default()).map_err(zipped)?;
-        archive.write_all(&fs::read(&path).map_err(io)?).map_err(io)?;
-    }
-    archive.finish().map_err(zipped)?;
-    Ok(json!({ "file": file }))
 }

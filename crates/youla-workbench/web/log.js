@@ -32,6 +32,7 @@ const log = (() => {
     const path = one.name, bytes = new Uint8Array(await one.arrayBuffer());
     if (path.endsWith(".toml")) return ofSettings(path, new TextDecoder().decode(bytes));
     engine.put(path, bytes);
+    if (path.endsWith(".zip") && await ofArchive(path)) return;
     const found = await survey(path);
     if (found.error) {
       engine.files.delete(path);
@@ -53,6 +54,15 @@ const log = (() => {
       if (!data.inputs.length && !data.outputs.length) suggest(data, good);
     });
     drawn();
+  }
+
+  /** Opens the run folder that an archive holds. @param {string} path */
+  async function ofArchive(path) {
+    const run = runs.free(stem(path)), answer = await engine.ask({ verb: "unpack", file: path, out: run }, { collect: `${run}/` });
+    if (!answer.run) return false;
+    engine.files.delete(path);
+    runs.dropped(run);
+    return true;
   }
 
   /** Takes a run.toml; a file has no folder here, so that its paths become names of files. @param {string} path @param {string} text */

@@ -10,11 +10,23 @@ const runs = (() => {
   const text = (/** @type {Uint8Array} */ bytes) => new TextDecoder().decode(bytes);
   const trusted = (/** @type {any} */ summary) => summary?.recommended?.trusted === true;
 
+  /** A name that no run has. @param {string} stem */
+  function free(stem) {
+    let name = stem;
+    for (let k = 2; done.has(name); k++) name = `${stem}-${k}`;
+    return name;
+  }
+
+  function unused() {
+    while (done.has(`run-${String(next).padStart(3, "0")}`)) next++;
+    return `run-${String(next++).padStart(3, "0")}`;
+  }
+
   async function identify() {
     if (running) return;
     running = start.disabled = true;
     await settings.settled();
-    const asked = settings.text, out = `run-${String(next++).padStart(3, "0")}`, begun = performance.now();
+    const asked = settings.text, out = unused(), begun = performance.now();
     stop.hidden = bar.hidden = false;
     bar.value = 0;
     const ticking = setInterval(() => { const s = (performance.now() - begun) / 1000; progress.dataset.seconds = s.toFixed(1); progress.textContent = `${progress.dataset.stage ?? "starting"}, ${s.toFixed(0)} s${remaining(s)}`; }, 250);
@@ -100,11 +112,13 @@ const runs = (() => {
   /** Opens a run folder whose files are there, as one that was dropped. @param {string} run */
   function dropped(run) {
     const [summary, report] = ["summary.json", "report.json"].map(name => fileOf(run, name));
-    if (!summary || !report) return told("bad", `${run} is no run folder: it has no summary.json or no report.json.`, []);
+    const status = by("log-status");
+    if (!summary || !report) return void (status.textContent = `${run} is no run folder: it has no summary.json or no report.json.`);
     try {
       const read = JSON.parse(text(summary));
       done.set(run, { name: run, sentence: JSON.parse(text(report)).verdict[0].text, reasons: read.recommended?.reasons ?? [], summary: read });
-    } catch { return told("bad", `summary.json or report.json of ${run} is not what a run writes.`, []); }
+    } catch { return void (status.textContent = `summary.json or report.json of ${run} is not what a run writes.`); }
+    status.textContent = `The run folder ${run} is open: its result is shown under Model.`;
     show(run);
   }
 
@@ -124,7 +138,7 @@ const runs = (() => {
     aged();
     order.querySelector("input").value = table.recommended?.order ?? "";
   });
-  return { identify, show, dropped, done, get shown() { return shown; } };
+  return { identify, show, dropped, free, done, get shown() { return shown; } };
 })();
 
 /** Hands a file to the user. @param {string} name @param {Uint8Array | undefined} bytes */

@@ -92,7 +92,13 @@ fn from_a_log_to_gains() {
 
     let packed = folder.0.join("run.zip");
     ask(&json!({ "verb": "archive", "run": run, "file": packed }));
-    assert!(fs::metadata(packed).unwrap().len() > 10_000);
+    assert!(fs::metadata(&packed).unwrap().len() > 10_000);
+    let again = folder.0.join("again");
+    assert_eq!(ask(&json!({ "verb": "unpack", "file": packed, "out": again })), json!({ "run": true }));
+    for name in ["report.json", "4-identify/region.json"] {
+        assert_eq!(fs::read(run.join(name)).unwrap(), fs::read(again.join(name)).unwrap());
+    }
+    assert_eq!(ask(&json!({ "verb": "draw", "run": again }))["draws"], 100);
 }
 
 /// Two resonances at 40 and 90 Hz are steady modes of all orders above theirs.
@@ -143,6 +149,7 @@ fn refusals_are_sentences() {
         json!({ "verb": "survey", "file": folder.0.join("absent.csv"), "csv": {} }),
         json!({ "verb": "survey", "file": folder.file("words.csv", "a,b\nc,d\n"), "csv": {} }),
         json!({ "verb": "draw", "run": folder.0 }),
+        json!({ "verb": "unpack", "file": log, "out": folder.0.join("run") }),
         json!({ "verb": "compare", "runs": [folder.0, folder.0] }),
         json!({ "verb": "unknown" }),
     ] {

@@ -32,6 +32,9 @@ const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
   domain: [["continuous", "s"], ["discrete", "z"]], hold: [["tustin", "Tustin"], ["zoh", "zero-order hold"]],
 });
 
+/** How many loops the gains of a PID are those of; 1 for other forms. @param {any} controller */
+const loopsOf = controller => Math.max(1, ...Object.values(controller?.pid ?? controller?.ideal_pid ?? {}).map(value => Array.isArray(value) ? value.length : 1));
+
 /** Sets a key, or takes it away; a name with a point is that of a key in a table of its own. @param {any} of @param {string} path @param {any} value */
 function setKey(of, path, value) {
   const [table, name] = path.includes(".") ? path.split(".") : ["", path], place = table ? of[table] ??= {} : of;

@@ -2,35 +2,52 @@
 
 const gains = (() => {
   const place = /** @type {HTMLElement} */ (document.getElementById("gain-fields")), said = /** @type {HTMLElement} */ (document.getElementById("gain-verdict")), host = /** @type {HTMLElement} */ (document.getElementById("gain-plots"));
+  const by = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id)), reset = by("gains-reset");
   let run = "", asked = false, again = false, shape = "";
   let /** @type {any} */ edited = null, /** @type {any} */ ran = null, /** @type {any} */ before = null, /** @type {any} */ plots = {};
 
   /** @param {string} shown */
   async function show(shown) {
-    run = shown;
+    [run, ran] = [shown, null];
     said.textContent = "";
     document.body.classList.remove("has-gains");
     const drawn = await engine.ask({ verb: "draw", run });
     if (run !== shown) return;
     if (drawn.error) return;
     const answer = await engine.ask({ verb: "table", toml: new TextDecoder().decode(engine.files.get(`${run}/run.toml`)) });
-    ran = answer.controller;
-    edited = structuredClone(ran);
     before = await engine.ask({ verb: "loop", run, controller: null });
-    if (run !== shown) return;
+    if (run !== shown || !answer.controller) return;
+    ran = answer.controller;
+    edited = onTrial();
     document.body.classList.add("has-gains");
     fields();
     ask();
   }
 
+  /** The gains on trial where they are those of the form that ran, with the sign of the controller that ran, which is no gain. */
+  function onTrial() {
+    const form = Object.keys(ran)[0], trial = settings.trial?.[form], fits = trial && loopsOf(settings.trial) === loopsOf(ran);
+    return structuredClone(fits ? { [form]: { ...trial, feedback: ran[form].feedback } } : ran);
+  }
+
+  const same = (/** @type {any} */ a, /** @type {any} */ b) => JSON.stringify(a) === JSON.stringify(b);
+  const keep = () => settings.try(same(edited, ran) ? null : structuredClone(edited));
+  reset.addEventListener("click", () => settings.try(null));
+  by("gains-save").addEventListener("click", () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))));
+  settings.listen(() => {
+    if (!ran || same(edited, onTrial())) return;
+    edited = onTrial();
+    // The field that is left has the focus until the next one takes it.
+    setTimeout(fields);
+    ask();
+  });
+
   function fields() {
     const form = Object.keys(edited)[0], values = edited[form];
-    const changed = (name, value) => { setKey(values, name, value); ask(); };
+    const changed = (name, value) => { setKey(values, name, value); ask(); }, kept = (name, value) => { changed(name, value); keep(); setTimeout(fields); };
     const loops = name => [values[name]].flat().keys(), sliders = ["kp", "ki", "kd", "ti", "td"].filter(name => values[name] !== undefined)
       .flatMap(name => [...loops(name)].filter(k => [values[name]].flat()[k] > 0).map(k => slider(name, k, values, changed)));
-    refill(place, ...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && /^(number|gain)/.test(f[2]))) setTimeout(fields); }) : [])),
-      element("div", { class: "fields" }, element("button", { type: "button", class: "action", onclick: () => { edited = structuredClone(ran); fields(); ask(); } }, "Back to the controller that ran"),
-        element("button", { type: "button", class: "action", onclick: () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))) }, "Save these gains")));
+    refill(place, ...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, kept) : [])));
   }
 
   /** A factor from a tenth to ten times the value of the controller that ran, in one loop. @param {string} name @param {number} k @param {any} values @param {(name: string, value: number | number[]) => void} changed */
@@ -45,6 +62,7 @@ const gains = (() => {
       if (field instanceof HTMLInputElement) field.value = gainText(next);
       changed(name, several ? next : value);
     });
+    input.addEventListener("change", keep);
     return element("label", { class: "slider" }, element("span", {}, title), input, shown);
   }
 
@@ -69,6 +87,7 @@ const gains = (() => {
   async function ask() {
     if (asked) { again = true; return; }
     asked = true;
+    reset.disabled = same(edited, ran);
     const open = edited.state_space && !edited.state_space.a.length, answer = await engine.ask({ verb: "loop", run, controller: open ? null : edited });
     asked = false;
     if (again) { again = false; ask(); }

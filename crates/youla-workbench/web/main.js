@@ -44,7 +44,7 @@
   undo.addEventListener("click", () => settings.undo());
   redo.addEventListener("click", () => settings.redo());
   addEventListener("keydown", event => {
-    const writing = event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLInputElement && event.target.type === "text";
+    const writing = event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLInputElement && event.target.type === "text" && event.target.value !== event.target.defaultValue;
     if (!(event.ctrlKey || event.metaKey) || writing) return;
     const key = event.key.toLowerCase();
     if (key === "z") { event.preventDefault(); event.shiftKey ? settings.redo() : settings.undo(); }
@@ -56,7 +56,7 @@
   async function save() {
     const packed = [];
     for (const [path, bytes] of engine.files) packed.push([path, await text64(bytes)]);
-    const state = JSON.stringify({ toml: settings.text, files: packed, runs: [...runs.done], shown: runs.shown }).replaceAll("<", "\\u003c");
+    const state = JSON.stringify({ toml: settings.text, trial: settings.trial, files: packed, runs: [...runs.done], shown: runs.shown }).replaceAll("<", "\\u003c");
     const page = `<!doctype html>\n${own.slice(0, own.lastIndexOf("</body>"))}<script type="application/json" id="saved">${state}<\/script>\n</body></html>\n`;
     download(`${settings.table.name || "workbench"}.html`, new TextEncoder().encode(page));
   }
@@ -77,7 +77,7 @@
       const raw = Uint8Array.from(atob(packed), c => c.charCodeAt(0)), stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("gzip"));
       engine.put(path, new Uint8Array(await new Response(stream).arrayBuffer()));
     }
-    await settings.read(state.toml);
+    await settings.restore({ text: state.toml, trial: state.trial });
     await log.surveyAgain();
     for (const [name, run] of state.runs) runs.done.set(name, run);
     runs.show(state.shown);

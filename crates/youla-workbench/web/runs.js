@@ -130,7 +130,7 @@ const runs = (() => {
     const needed = [!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran",
       controller && !of.feedback && "the sign of its feedback", pid && of.kp == null && "its kp"].filter(Boolean);
     const names = (/** @type {any[]} */ list) => list.map(c => c.from ?? c.name).join(", ");
-    const loops = Math.max(1, ...Object.values(of).map(value => Array.isArray(value) ? value.length : 1));
+    const loops = loopsOf(controller);
     const many = !needed.length && pid && (data.inputs.length !== loops || data.outputs.length !== loops);
     start.disabled = running || needed.length > 0 || many;
     by("missing").textContent = needed.length ? `Still needed: ${needed.join(", ")}.` : many

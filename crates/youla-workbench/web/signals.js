@@ -139,6 +139,6 @@ const signals = (() => {
     saidOfController.textContent = controller ? `${controller.sentence}.` : "";
   }
 
-  settings.listen(draw);
+  settings.listen((_, onlyTrial) => { if (!onlyTrial) draw(); });
   return { ofOutputs: () => drawnCurves.filter(c => log.roleOf(c.name) === "output") };
 })();

@@ -10,8 +10,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const FILES: [&str; 6] =
-    ["package.json", "package-lock.json", "browser.mjs", "pages.test.mjs", "report.test.mjs", "workbench.test.mjs"];
+const FILES: [&str; 4] = ["package.json", "package-lock.json", "browser.mjs", "workbench.mjs"];
+const TESTS: [&str; 4] =
+    ["pages.test.mjs", "report.test.mjs", "workbench.test.mjs", "gains.test.mjs"];
 
 #[test]
 #[ignore = "needs npm, node 20 or later and Chromium"]
@@ -29,15 +30,8 @@ fn prepared() -> Result<Command, String> {
     let pages = pages(&folder.join("pages"));
     let mut command = Command::new("node");
     command
-        .args([
-            "--test",
-            "--test-concurrency=2",
-            "--test-timeout=120000",
-            "--test-reporter=spec",
-            "pages.test.mjs",
-            "report.test.mjs",
-            "workbench.test.mjs",
-        ])
+        .args(["--test", "--test-concurrency=2", "--test-timeout=120000", "--test-reporter=spec"])
+        .args(TESTS)
         .current_dir(&folder);
     let workbench = json!({
         "workbench": folder.join("pages/workbench.html").display().to_string(), "program": env!("CARGO_BIN_EXE_youla"),
@@ -86,7 +80,7 @@ fn install(folder: &Path) -> Result<(), String> {
     fs::create_dir_all(folder).expect("a temporary folder");
     let lock = fs::read(source.join("package-lock.json")).expect("part of the project");
     let there = fs::read(folder.join("installed.json")).is_ok_and(|installed| installed == lock);
-    for file in FILES {
+    for file in FILES.iter().chain(&TESTS) {
         fs::copy(source.join(file), folder.join(file)).expect("the temporary folder can be written");
     }
     if there {

@@ -44,7 +44,9 @@ struct Kept {
     plant: SystemMatrices,
     /// The controller that ran, positive feedback.
     running: SystemMatrices,
-    /// Plants of the region under which the controller that ran is stable: the log contradicts the others.
+    /// Plants drawn from the region.
+    drawn: usize,
+    /// Those of them under which the controller that ran is stable: the log contradicts the others.
     draws: Vec<SystemMatrices>,
 }
 
@@ -61,7 +63,7 @@ pub(crate) fn keep(run: &Path) -> Result<Value> {
     let possible = |plant: &StateSpace<Discrete>| {
         closed_loop(plant, &ports).and_then(|looped| looped.is_stable()).unwrap_or(false)
     };
-    let draws = region.draws(DRAWS, SEED).into_iter().map(|draw| draw.plant).filter(possible);
+    let drawn = region.draws(DRAWS, SEED);
     let names = |channels: Option<Vec<Channel>>| channels.into_iter().flatten().map(|c| c.name).collect();
     let kept = Kept {
         ts: recommended.ts,
@@ -69,7 +71,8 @@ pub(crate) fn keep(run: &Path) -> Result<Value> {
         inputs: names(recommended.inputs),
         outputs: names(recommended.outputs),
         running: controller.matrices,
-        draws: draws.map(|plant| SystemMatrices::new(&plant)).collect(),
+        drawn: drawn.len(),
+        draws: drawn.into_iter().map(|draw| draw.plant).filter(possible).map(|p| SystemMatrices::new(&p)).collect(),
     };
     let path = file_of(run);
     std::fs::write(&path, serde_json::to_string(&kept)?).map_err(|source| Refusal::at(&path, source))?;
@@ -96,7 +99,7 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     }
     let stable = centre.is_stable()?;
     let mut answer = json!({
-        "stable": stable, "draws": draws.len(), "unstable": unstable, "inputs": kept.inputs, "outputs": kept.outputs,
+        "stable": stable, "drawn": kept.drawn, "draws": draws.len(), "unstable": unstable, "inputs": kept.inputs, "outputs": kept.outputs,
         "worst_pole": centre.worst_pole()?.map_or(0.0, |pole| pole.norm()),
     });
     let omega = grid(&plant, time)?;

@@ -1,8 +1,12 @@
 // The loop that other gains would have, on the whole region of the model, while they are edited.
 
+/** Peak sensitivities above which a loop has little margin, and is nearly unstable: 4 ends zone B of ISO 14839-3, unrestricted operation. */
+const LITTLE = 2, NEARLY = 4;
+
 const gains = (() => {
   const place = /** @type {HTMLElement} */ (document.getElementById("gain-fields")), said = /** @type {HTMLElement} */ (document.getElementById("gain-verdict")), host = /** @type {HTMLElement} */ (document.getElementById("gain-plots"));
-  const by = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id)), reset = by("gains-reset");
+  const by = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id)), reset = by("gains-reset"), caution = by("gain-caution"), saved = by("gains-saved"), figures = by("gain-figures");
+  const worstOf = (/** @type {any} */ found) => Math.max(found.margins.sensitivity, found.worst_sensitivity);
   let run = "", asked = false, again = false, shape = "";
   let /** @type {any} */ edited = null, /** @type {any} */ ran = null, /** @type {any} */ before = null, /** @type {any} */ plots = {};
 
@@ -33,7 +37,10 @@ const gains = (() => {
   const same = (/** @type {any} */ a, /** @type {any} */ b) => JSON.stringify(a) === JSON.stringify(b);
   const keep = () => settings.try(same(edited, ran) ? null : structuredClone(edited));
   reset.addEventListener("click", () => settings.try(null));
-  by("gains-save").addEventListener("click", () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))));
+  by("gains-save").addEventListener("click", () => {
+    download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2)));
+    saved.textContent = "Saved as controller.json.";
+  });
   settings.listen(() => {
     if (!ran || same(edited, onTrial())) return;
     edited = onTrial();
@@ -66,18 +73,37 @@ const gains = (() => {
     return element("label", { class: "slider" }, element("span", {}, title), input, shown);
   }
 
-  // Where S first exceeds -3 dB, overshoot of the first output, largest command for a unit step of the reference.
+  /** Name, unit and value of each figure, and which of more (1) and less (-1) is worse; infinite without a limit, null without a value. @param {any} found @returns {[string, string, number | null, number][] | null} */
   function figuresOf(found) {
-    if (!found?.sensitivity) return null;
+    const m = found?.margins;
+    if (!m) return null;
     const k = found.sensitivity.centre.findIndex(v => v > Math.SQRT1_2);
-    return [k > 0 ? found.hz[k] : null, 100 * Math.max(0, Math.max(...found.step[0].centre) - 1), Math.max(...found.command.flatMap(c => c.centre.map(Math.abs)))];
+    return [["Peak sensitivity", "", m.sensitivity, 1], ["Peak sensitivity, at worst over the region", "", worstOf(found), 1], ["Phase margin", "°", m.phase ?? Infinity, -1],
+      ["Gain margin, largest stable factor", "", m.gain_up ?? Infinity, -1], ["Gain margin, smallest stable factor", "", m.gain_down > 1e-6 ? m.gain_down : 0, 1], ["Delay margin", " ms", m.delay == null ? Infinity : 1e3 * m.delay, -1],
+      ["S is below −3 dB up to", " Hz", k > 0 ? found.hz[k] : null, -1], ["Overshoot", " %", 100 * Math.max(0, Math.max(...found.step[0].centre) - 1), 1], ["Largest command for a unit step", "", Math.max(...found.command.flatMap(c => c.centre.map(Math.abs))), 0]];
   }
 
+  /** The figures beside those of the controller that ran; what became worse is marked. @param {any} found */
   function compared(found) {
-    const now = figuresOf(found), then = figuresOf(before), words = ["S below −3 dB up to", "overshoot", "largest command for a unit step"], units = [" Hz", " %", ""];
-    if (!now || !then) return "";
-    const said = words.map((word, k) => now[k] == null || then[k] == null ? null : `${word} ${readOut(now[k])}${units[k]} (controller that ran: ${readOut(then[k])}${units[k]})`).filter(Boolean);
-    return said.length ? ` ${said.join("; ")}.`.replace(" S below", " S is below") : "";
+    const now = figuresOf(found), then = figuresOf(before), cell = (kind, text) => element("td", { class: kind }, text);
+    const row = ([name, unit, , worse], k) => {
+      const [a, b] = [now, then].map(of => of?.[k][2] ?? null), [here, there] = [a, b].map(v => v == null ? "–" : v === Infinity ? "no limit" : `${readOut(v)}${unit}`);
+      const bad = a != null && b != null && worse * (a - b) > 0 && here !== there;
+      return element("tr", {}, element("th", { scope: "row" }, name), cell(`number ${bad ? "no" : ""}`, here), cell("number", there), cell("no", bad ? "worse" : ""));
+    };
+    const head = ["", "These gains", "Controller that ran", ""].map((text, k) => element("th", { scope: "col", class: k % 3 ? "number" : null }, text));
+    figures.replaceChildren(element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...(now ?? then ?? []).map(row))));
+  }
+
+  /** What is said of gains: the colour, a word beside the button that saves them, the sentence. @param {any} found */
+  function verdictOf(found) {
+    const { draws, drawn } = found, part = drawn > draws, models = `all ${draws} models ${part ? "that the controller that ran stabilises" : "of the region"}`;
+    const rest = part ? ` The controller that ran does not stabilise ${drawn - draws} of ${drawn} models drawn from the region, which the log contradicts; they are left out.` : "";
+    if (!found.stable) return ["bad", "Unstable", `Unstable on the recommended model: largest pole ${readOut(found.worst_pole)}.${rest}`];
+    if (found.unstable) return ["bad", `Unstable on ${found.unstable} of ${draws} models`, `Unstable on ${found.unstable} of ${draws} models ${part ? "that the controller that ran stabilises" : "of the region"}.${rest}`];
+    const worst = worstOf(found), peak = `${readOut(found.margins.sensitivity)}, at worst ${readOut(worst)} over the region`, word = worst > NEARLY ? "Nearly unstable" : "Little margin";
+    if (worst <= LITTLE) return ["good", "", `Stable on ${models}; peak sensitivity ${peak}.${rest}`];
+    return [worst > NEARLY ? "bad" : "caution", `${word}: peak sensitivity ${readOut(worst)}`, `${word}: stable on ${models}, but the peak sensitivity is ${peak}; ${worst > NEARLY ? "ISO 14839-3 allows up to 4 for unrestricted operation" : "up to 2 is good"}.${rest}`];
   }
 
   // The running loop's curve at the places of the new one, held at its end.
@@ -88,24 +114,23 @@ const gains = (() => {
     if (asked) { again = true; return; }
     asked = true;
     reset.disabled = same(edited, ran);
+    saved.textContent = "";
     const open = edited.state_space && !edited.state_space.a.length, answer = await engine.ask({ verb: "loop", run, controller: open ? null : edited });
     asked = false;
     if (again) { again = false; ask(); }
     draw(answer);
   }
 
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (plots.drawn) locus(plots.drawn); });
+
   /** @param {any} found */
   function draw(found) {
-    const note = (/** @type {string} */ kind, /** @type {string} */ text) => { said.className = `headline ${kind}`; said.textContent = text; };
-    if (found.error) return note("bad", found.error);
+    const [kind, word, sentence] = found.error ? ["bad", "", found.error] : verdictOf(found);
+    Object.assign(said, { className: `headline ${kind}`, textContent: sentence });
+    Object.assign(caution, { className: kind, textContent: word && `${word}.` });
+    compared(found);
+    if (found.error) return;
     const safe = found.stable && !found.unstable;
-    if (!found.stable) note("bad", `Unstable on the recommended model: largest pole ${readOut(found.worst_pole)}.`);
-    else if (found.unstable) note("bad", `Unstable on ${found.unstable} of ${found.draws} models of the region.`);
-    else {
-      const m = found.margins, worst = Math.max(m.sensitivity, found.worst_sensitivity), parts = [`peak sensitivity ${readOut(m.sensitivity)}, at worst ${readOut(worst)} over the region`, m.phase != null ? `phase margin ${readOut(m.phase)}°` : null,
-        m.gain_up != null ? `unstable at ${readOut(m.gain_up)} times the gain` : null, m.gain_down > 1e-6 ? `and at ${readOut(m.gain_down)} times` : null, m.delay != null ? `delay margin ${readOut(m.delay * 1e3)} ms` : null].filter(Boolean);
-      note(worst <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.${compared(found)}`);
-    }
     const wanted = JSON.stringify([run, found.outputs, found.inputs, !!found.locus]);
     if (wanted !== shape) { shape = wanted; build(found); }
     host.classList.toggle("unsafe", !safe);
@@ -117,6 +142,7 @@ const gains = (() => {
       found.outputs.forEach((_, k) => plots.step[k].setData([found.t, found.step[k].centre, found.step[k].high, found.step[k].low, then("step", k)]));
       found.inputs.forEach((_, k) => plots.command[k].setData([found.t, found.command[k].centre, found.command[k].high, found.command[k].low, then("command", k)]));
     } else [plots.s, ...plots.step, ...plots.command].forEach(empty);
+    plots.drawn = found.locus && found;
     if (found.locus) locus(found);
   }
 

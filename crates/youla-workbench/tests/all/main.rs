@@ -99,6 +99,23 @@ fn from_a_log_to_gains() {
         assert_eq!(fs::read(run.join(name)).unwrap(), fs::read(again.join(name)).unwrap());
     }
     assert_eq!(ask(&json!({ "verb": "draw", "run": again }))["draws"], 100);
+
+    // At the limit of stability, k = 19, the controller that ran stabilises a part of the region: the rest is counted.
+    let file = again.join("2-factor/controller.json");
+    let mut controller: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    let (mut low, mut high) = (10.0, 30.0);
+    let left = loop {
+        let k = 0.5 * (low + high);
+        controller["d"] = json!([[-k]]);
+        fs::write(&file, controller.to_string()).unwrap();
+        match ask(&json!({ "verb": "draw", "run": again }))["draws"].as_u64().unwrap() {
+            0 => high = k,
+            100 => low = k,
+            left => break left,
+        }
+    };
+    let of_part = ask(&json!({ "verb": "loop", "run": again, "controller": null }));
+    assert_eq!((&of_part["drawn"], &of_part["draws"], &of_part["unstable"]), (&json!(100), &json!(left), &json!(0)));
 }
 
 /// Two resonances at 40 and 90 Hz are steady modes of all orders above theirs.

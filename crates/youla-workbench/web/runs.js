@@ -29,6 +29,7 @@ const runs = (() => {
     const asked = settings.text, out = unused(), begun = performance.now();
     stop.hidden = bar.hidden = false;
     bar.value = 0;
+    refuse("");
     const ticking = setInterval(() => { const s = (performance.now() - begun) / 1000; progress.dataset.seconds = s.toFixed(1); progress.textContent = `${progress.dataset.stage ?? "starting"}, ${s.toFixed(0)} s${remaining(s)}`; }, 250);
     const answer = await engine.ask({ verb: "identify", toml: asked, out }, { collect: out, said: line => {
       const [at, of, stage] = line.split(" ");
@@ -41,7 +42,7 @@ const runs = (() => {
     const seconds = (performance.now() - begun) / 1000;
     progress.textContent = answer.cancelled ? "Cancelled; log and settings are as they were." : answer.error ? "" : `Finished in ${seconds.toFixed(1)} s.`;
     if (answer.cancelled) return;
-    if (answer.error) return told("bad", answer.error, []);
+    if (answer.error) return refuse(answer.error);
     Object.assign(known, { samples: samples(), seconds });
     done.set(out, { name: out, sentence: answer.sentence, reasons: answer.reasons, summary: answer.summary, toml: asked });
     show(out);
@@ -56,10 +57,16 @@ const runs = (() => {
     return left > 0.5 ? `, about ${left.toFixed(0)} s to go` : "";
   }
 
+  /** Says why what was asked for is not done, above the result that is still shown. @param {string} why */
+  function refuse(why) {
+    by("refused").replaceChildren(...(why ? [line("bad", why)] : []));
+  }
+
+  const line = (/** @type {string} */ kind, /** @type {string} */ sentence) => element("p", { class: `headline verdict-line ${kind}` }, element("span", { class: `status ${kind}`, "aria-hidden": "true" }, kind === "good" ? "✓" : "!"), sentence);
+
   /** @param {string} kind @param {string} sentence @param {string[]} reasons */
   function told(kind, sentence, reasons) {
-    verdict.replaceChildren(element("p", { class: `headline verdict-line ${kind}` }, element("span", { class: `status ${kind}`, "aria-hidden": "true" }, kind === "good" ? "✓" : "!"), sentence),
-      ...(reasons.length ? [element("ul", { class: "points" }, ...reasons.map(r => element("li", {}, r)))] : []));
+    verdict.replaceChildren(line(kind, sentence), ...(reasons.length ? [element("ul", { class: "points" }, ...reasons.map(r => element("li", {}, r)))] : []));
   }
 
   // A result of other settings than those on the page says so.
@@ -74,6 +81,7 @@ const runs = (() => {
     const found = done.get(run);
     if (!found) return;
     shown = run;
+    refuse("");
     document.body.classList.add("has-run");
     told(trusted(found.summary) ? "good" : "caution", found.sentence, found.reasons);
     const page = fileOf(run, "report.html");
@@ -98,14 +106,14 @@ const runs = (() => {
   async function compare() {
     if (!other) return;
     const answer = await engine.ask({ verb: "compare", runs: [shown, other] });
-    if (answer.error) return told("caution", answer.error, []);
+    if (answer.error) return refuse(answer.error);
     frame.srcdoc = answer.html;
     frame.scrollIntoView();
   }
 
   async function archive() {
     const file = `${shown}.zip`, answer = await engine.ask({ verb: "archive", run: shown, file }, { collect: file });
-    if (answer.error) return told("caution", answer.error, []);
+    if (answer.error) return refuse(answer.error);
     download(file, engine.files.get(file));
   }
 

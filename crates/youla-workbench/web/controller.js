@@ -35,6 +35,27 @@ const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
 /** How many loops the gains of a PID are those of; 1 for other forms. @param {any} controller */
 const loopsOf = controller => Math.max(1, ...Object.values(controller?.pid ?? controller?.ideal_pid ?? {}).map(value => Array.isArray(value) ? value.length : 1));
 
+/** A value of a form, named as for `setKey`. @param {any} of @param {string} path */
+const keyOf = (of, path) => path.split(".").reduce((at, name) => at?.[name], of);
+
+const SIGN = "the sign of the feedback";
+const and = (/** @type {string[]} */ list) => list.join(", ").replace(/, ([^,]*)$/, " and $1");
+
+/** What must still be stated of a controller. @param {any} controller @returns {string[]} */
+function neededBy(controller) {
+  const [form, of] = Object.entries(controller)[0], empty = emptyOf(form, of, kind => kind === "number" || kind === "gain");
+  return of.feedback ? empty : [...empty, SIGN];
+}
+
+/** Labels of the fields of a form that are empty. @param {string} form @param {any} of @param {(kind: string) => boolean} wanted */
+const emptyOf = (form, of, wanted) => (FORMS[form]?.fields ?? []).filter(([path, , kind]) => wanted(kind) && keyOf(of, path) == null).map(([, label]) => label);
+
+/** The fields that may stay empty, in a sentence. @param {any} controller */
+function optionalOf(controller) {
+  const [form, of] = Object.entries(controller)[0], empty = emptyOf(form, of, kind => kind.endsWith("?"));
+  return empty.length ? `. ${and(empty)} may stay empty: the controller then has no such part` : "";
+}
+
 /** Sets a key, or takes it away; a name with a point is that of a key in a table of its own. @param {any} of @param {string} path @param {any} value */
 function setKey(of, path, value) {
   const [table, name] = path.includes(".") ? path.split(".") : ["", path], place = table ? of[table] ??= {} : of;
@@ -44,10 +65,10 @@ function setKey(of, path, value) {
 /** Fields of a form, named as for `setKey`. @param {string} form @param {any} of @param {(name: string, value: any) => void} changes @param {typeof FORMS} forms */
 function formFields(form, of, changes, forms = FORMS) {
   return forms[form].fields.filter(([name]) => name !== "hold" || of.domain === "continuous").map(([path, label, kind, unit]) => {
-    const [table, name] = path.includes(".") ? path.split(".") : ["", path], values = table ? of[table] ?? {} : of;
-    if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changes(path, value) });
-    if (/^(number|gain|count)/.test(kind)) return numberField({ label, unit, name, optional: !["number", "gain"].includes(kind), several: kind.startsWith("gain"), value: values[name], changed: value => changes(path, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
-    const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
+    const name = path.split(".").pop(), value = keyOf(of, path);
+    if (CHOICES[kind]) return choiceField({ label, value, options: CHOICES[kind], changed: value => changes(path, value) });
+    if (/^(number|gain|count)/.test(kind)) return numberField({ label, unit, name, optional: !["number", "gain"].includes(kind), several: kind.startsWith("gain"), value, changed: value => changes(path, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
+    const input = element("input", { type: "text", size: 34, value: value === undefined ? "" : kind === "json" ? JSON.stringify(value) : [value].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;
       try { read = kind === "json" || input.value.includes("[") ? JSON.parse(input.value) : numbersOf(input.value); } catch { read = null; }

@@ -134,12 +134,11 @@ const runs = (() => {
   stop.addEventListener("click", () => engine.cancel());
   order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => { const value = numberOf(event.target.value); orders.pick(() => value == null ? null : Math.round(value)); });
   settings.listen(table => {
-    const { data, controller } = table, form = Object.keys(controller ?? {})[0], of = controller?.[form] ?? {}, pid = ["pid", "ideal_pid"].includes(form);
-    const needed = [!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran",
-      controller && !of.feedback && "the sign of its feedback", pid && of.kp == null && "its kp"].filter(Boolean);
+    const { data, controller } = table, pid = controller?.pid ?? controller?.ideal_pid;
+    const needed = [!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", ...(controller ? neededBy(controller) : ["the controller that ran"])].filter(Boolean);
     const names = (/** @type {any[]} */ list) => list.map(c => c.from ?? c.name).join(", ");
     const loops = loopsOf(controller);
-    const many = !needed.length && pid && (data.inputs.length !== loops || data.outputs.length !== loops);
+    const many = !!pid && !needed.length && (data.inputs.length !== loops || data.outputs.length !== loops);
     start.disabled = running || needed.length > 0 || many;
     by("missing").textContent = needed.length ? `Still needed: ${needed.join(", ")}.` : many
       ? `${loops === 1 ? "A PID drives one input and reads one output" : `The gains are those of ${loops} loops`}, but the inputs are ${names(data.inputs)} and the outputs ${names(data.outputs)}. Is one of them the excitation, or not used? The gains of several loops have semicolons between them: 2; 1.5.` : "";

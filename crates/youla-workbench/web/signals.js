@@ -2,7 +2,7 @@
 
 const signals = (() => {
   const host = /** @type {HTMLElement} */ (document.getElementById("traces")), spectra = /** @type {HTMLElement} */ (document.getElementById("spectra")), listed = /** @type {HTMLElement} */ (document.getElementById("findings"));
-  const modes = /** @type {HTMLElement} */ (document.getElementById("range-mode")), saidOfController = /** @type {HTMLElement} */ (document.getElementById("controller-said"));
+  const modes = /** @type {HTMLElement} */ (document.getElementById("range-mode")), saidOfController = /** @type {HTMLElement} */ (document.getElementById("controller-said")), defect = /** @type {HTMLElement} */ (document.getElementById("defect"));
   /** @type {any[]} */
   let plots = [];
   const PALETTE = ["--hansen", "--direct", "--hansen-reduced", "--pem", "--other-1", "--other-4"];
@@ -116,14 +116,16 @@ const signals = (() => {
     const timer = checking = window.setTimeout(async () => {
       const { data, controller } = settings.table;
       if (!data.inputs.length || !data.outputs.length || !log.sampleTime()) return told([], null);
+      const needed = controller ? neededBy(controller) : [], whole = controller && !needed.length;
       // What can be said before a controller is described is said: as of an open loop, without the tests of the controller.
-      const table = controller ? settings.text : null, asked = table ?? (await engine.ask({ verb: "toml", table: { ...settings.table, controller: openLoop(data) } })).toml;
+      const asked = whole ? settings.text : (await engine.ask({ verb: "toml", table: { ...settings.table, controller: openLoop(data) } })).toml;
       const answer = timer === checking ? await engine.ask({ verb: "check", toml: asked }) : null;
+      // A controller without its sign is refused with the sign with which the log agrees.
+      const agreed = timer === checking && needed.join() === SIGN ? (await engine.ask({ verb: "check", toml: settings.text })).error?.match(/; the log agrees with [^.]*/) : null;
       if (timer !== checking) return;
-      // A sign that is missing is asked for where it is chosen.
-      if (answer.error?.includes("feedback")) return told([], { sentence: answer.error.replace(/^run\.toml[:\d]*: |\.$/g, "") });
       if (answer.error) return told([{ severity: "defect", sentence: answer.error }], null);
-      told(table ? answer.findings : answer.findings.filter(f => f.test !== "controller" && f.test !== "feedback"), table ? answer.controller : null);
+      if (whole) told(answer.findings, answer.controller);
+      else told(answer.findings.filter(f => f.test !== "controller" && f.test !== "feedback"), needed.length ? { sentence: `Still needed: ${needed.join(", ")}${agreed ?? ""}${optionalOf(controller)}` } : null);
       drawCoherence();
     }, 350);
   }
@@ -134,9 +136,12 @@ const signals = (() => {
     plots.forEach(u => u.redraw(false));
     const line = f => element("li", {}, element("span", { class: `status ${{ defect: "bad", caution: "caution" }[f.severity] ?? ""}`, "aria-hidden": "true" }, { defect: "!", caution: "!" }[f.severity] ?? "i"), element("span", {}, `${f.severity[0].toUpperCase()}${f.severity.slice(1)}: ${f.sentence}`));
     const serious = found.filter(f => f.severity !== "note"), notes = found.filter(f => f.severity === "note");
-    listed.replaceChildren(element("ul", { class: "notes plain" }, ...(serious.length ? serious.map(line) : [element("li", {}, settings.table.data.inputs.length && !controller?.sentence.includes("feedback") ? "The check found no defect." : "")])),
+    listed.replaceChildren(element("ul", { class: "notes plain" }, ...(serious.length ? serious.map(line) : [element("li", {}, settings.table.data.inputs.length ? "The check found no defect." : "")])),
       ...(notes.length ? [element("details", { open: listed.querySelector("details")?.open ? "" : null }, element("summary", {}, `${notes.length} notes`), element("ul", { class: "notes plain" }, ...notes.map(line)))] : []));
-    saidOfController.textContent = controller ? `${controller.sentence}.` : "";
+    const sentence = (/** @type {any} */ f) => `Defect: ${f.sentence}`, defects = found.filter(f => f.severity === "defect" && f.test), ofController = defects.find(f => f.test === "controller" || f.test === "feedback");
+    saidOfController.textContent = ofController ? sentence(ofController) : controller ? `${controller.sentence}.` : "";
+    saidOfController.className = ofController ? "note bad" : "";
+    defect.textContent = defects.length ? sentence(defects[0]) : "";
   }
 
   settings.listen((_, onlyTrial) => { if (!onlyTrial) draw(); });

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const FILES: [&str; 4] = ["package.json", "package-lock.json", "browser.mjs", "workbench.mjs"];
-const TESTS: [&str; 4] =
-    ["pages.test.mjs", "report.test.mjs", "workbench.test.mjs", "gains.test.mjs"];
+const TESTS: [&str; 5] =
+    ["pages.test.mjs", "report.test.mjs", "workbench.test.mjs", "gains.test.mjs", "results.test.mjs"];
 
 #[test]
 #[ignore = "needs npm, node 20 or later and Chromium"]

@@ -84,8 +84,7 @@ const runs = (() => {
     refuse("");
     document.body.classList.add("has-run");
     told(trusted(found.summary) ? "good" : "caution", found.sentence, found.reasons);
-    const page = fileOf(run, "report.html");
-    frame.srcdoc = page ? text(page) : "";
+    framed(text(fileOf(run, "report.html") ?? new Uint8Array()), false);
     listed();
     aged();
     gains.show(run);
@@ -107,9 +106,34 @@ const runs = (() => {
     if (!other) return;
     const answer = await engine.ask({ verb: "compare", runs: [shown, other] });
     if (answer.error) return refuse(answer.error);
-    frame.srcdoc = answer.html;
-    frame.scrollIntoView();
+    framed(answer.html, true);
+    by("close-comparison").scrollIntoView();
   }
+
+  /** @param {string} html @param {boolean} compares whether it is that of a comparison, which can be closed */
+  function framed(html, compares) {
+    frame.srcdoc = `${html}<script>(${reporting})()<\/script>`;
+    by("close-comparison").hidden = !compares;
+  }
+
+  // The frame is as high as its report, so that the page alone scrolls: it tells its height and the place of each part to which a link leads.
+  function reporting() {
+    const root = document.documentElement, told = (/** @type {object} */ what) => parent.postMessage(what, "*");
+    new ResizeObserver(() => told({ height: Math.ceil(root.getBoundingClientRect().height) })).observe(root);
+    // The address of the frame is none that its own links could lead to.
+    addEventListener("click", event => {
+      const link = event.target instanceof Element && event.target.closest("a[href^='#']"), part = link && document.querySelector(link.getAttribute("href") ?? "");
+      if (!part) return;
+      event.preventDefault();
+      told({ place: part.getBoundingClientRect().top });
+    });
+  }
+
+  addEventListener("message", ({ source, data }) => {
+    if (source !== frame.contentWindow) return;
+    if (data.height > 0) frame.style.height = `${data.height + 2}px`;
+    if (Number.isFinite(data.place)) scrollTo({ top: scrollY + frame.getBoundingClientRect().top + data.place });
+  });
 
   async function archive() {
     const file = `${shown}.zip`, answer = await engine.ask({ verb: "archive", run: shown, file }, { collect: file });
@@ -132,6 +156,7 @@ const runs = (() => {
 
   start.addEventListener("click", identify);
   stop.addEventListener("click", () => engine.cancel());
+  by("close-comparison").addEventListener("click", () => show(shown));
   order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => { const value = numberOf(event.target.value); orders.pick(() => value == null ? null : Math.round(value)); });
   settings.listen(table => {
     const { data, controller } = table, pid = controller?.pid ?? controller?.ideal_pid;

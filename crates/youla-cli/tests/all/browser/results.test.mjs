@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { axis, csv, field, identified, opened, says } from "./workbench.mjs";
+import { axis, csv, field, identified, opened, says, withResult } from "./workbench.mjs";
 
 test("what is still needed, a defect with its remedy and a refusal stand where they are looked for", async () => {
   const { page, complaints, close } = await opened();
@@ -29,6 +29,28 @@ test("what is still needed, a defect with its remedy and a refusal stand where t
   assert.match(await page.textContent("#refused"), /would verify nothing/);
   assert.deepEqual(await page.evaluate(() => ["refused", "verdict"].map(id => getComputedStyle(document.getElementById(id)).opacity)), ["1", "0.55"]);
   assert.match(await page.textContent("#verdict"), /^✓Trusted/);
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+test("the report is as high as it is long, its links lead, and a comparison is closed", async () => {
+  const { page, complaints, close } = await withResult();
+  await page.waitForFunction(() => document.getElementById("report").clientHeight > 2000);
+  const report = page.frameLocator("#report"), frame = page.locator("#report");
+  assert.ok(await report.locator("html").evaluate(node => node.scrollHeight <= innerHeight + 1 && node.scrollWidth <= innerWidth), "the frame has no bars");
+  await report.locator("#trust .evidence").first().click();
+  await page.waitForFunction(() => scrollY > document.getElementById("report").offsetTop + 500);
+  await page.getByRole("link", { name: "Skip the report" }).click();
+  await page.waitForFunction(() => Math.abs(document.getElementById("gains").getBoundingClientRect().top) < 100);
+  await page.fill("#order input", "4");
+  await page.keyboard.press("Tab");
+  await page.click("#identify");
+  await page.getByRole("button", { name: "Compare", exact: true }).click({ timeout: 100000 });
+  await page.waitForSelector("#close-comparison:not([hidden])");
+  assert.doesNotMatch(await frame.getAttribute("srcdoc"), /<h1>axis<\/h1>/);
+  await page.click("#close-comparison");
+  await page.waitForFunction(() => /<h1>axis<\/h1>/.test(document.getElementById("report").srcdoc));
+  assert.ok(await page.isHidden("#close-comparison"));
   assert.deepEqual(complaints, []);
   await close();
 });

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::Region as LibraryRegion;
+use youla::lti::Discrete;
 use youla_io::folder::RunFolder;
 use youla_io::{Value, mat_from_bytes};
 use youla_run::{RunSettings, pid_kept, records_in_memory, redesign_kept};
@@ -78,6 +79,17 @@ pub(crate) fn report_html(py: Python<'_>, json: &str) -> PyResult<String> {
 pub(crate) fn settings_json(toml: &str) -> PyResult<String> {
     let parsed = RunSettings::parse(toml, Path::new("run.toml")).map_err(Failure::from)?;
     Ok(serde_json::to_string(&parsed).map_err(Failure::from)?)
+}
+
+/// The controller that settings hold, in positive feedback, at a sample time in seconds.
+#[pyfunction]
+pub(crate) fn controller_model(py: Python<'_>, chosen: Options, ts: f64) -> PyResult<ModelOut<'_>> {
+    let of = || -> Result<_> {
+        let settings = chosen.settings()?;
+        settings.check()?;
+        Ok(settings.controller.realise(Discrete::new(ts)?, None, Path::new(""))?)
+    };
+    Ok(model_out(py, of()?.system()))
 }
 
 /// Refuses settings with keys or values that do not exist.

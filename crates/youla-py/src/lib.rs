@@ -20,7 +20,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use super::kept::{
-        Region, check_settings, read_mat, redesign, redesign_pid, report_html, settings_json, write_files,
+        Region, check_settings, controller_model, read_mat, redesign, redesign_pid, report_html, settings_json,
+        write_files,
     };
     #[pymodule_export]
     use super::logs::{clock, read_log, synchronise, unit_of_time};

@@ -239,7 +239,7 @@ def test_pids_of_several_loops_and_files_in_a_loop(nominal: youla.Model, tmp_pat
         (lambda: youla.certify(nominal, str(tmp_path / "k.csv"), feedback="negative"), "k.csv, which holds no model .*; give a file that model.save wrote"),
         (lambda: youla.certify(PIDS["tustin"], 2.0, feedback="negative"), "plant is a mapping, of which the sample time is not known"),
         (lambda: youla.certify(nominal, {"pid": {"kp": 2, "discretisation": "zoh"}}, feedback="negative"), "the choices are backward-euler, tustin"),
-        (lambda: youla.certify(nominal, {"transfer_function": {}}, feedback="negative"), "is made a model by identify only; give a youla.Model, control.tf"),
+        (lambda: youla.certify(nominal, {"transfer_function": {}}, feedback="negative"), "domain"),
     ):
         with pytest.raises(youla.InputError, match=says):
             call()

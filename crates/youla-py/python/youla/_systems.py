@@ -16,7 +16,6 @@ from ._errors import InputError
 from ._model import Model
 from ._optional import need
 from ._options import plain
-from ._pid import pid_model
 from ._sources import _is
 
 Table = dict[str, Any]
@@ -123,15 +122,12 @@ def _of_mapping(controller: Mapping[str, Any], dt: float) -> Model:
     form, table = _form(controller)
     if form == "model_file" and "file" in table:
         return _of_file(table["file"], "controller['model_file']['file']")
-    if form not in ("pid", "ideal_pid"):
-        raise InputError(
-            f"controller[{form!r}] is made a model by identify only; give a youla.Model, control.tf(...), or run.model('controller') with feedback='positive'"
-        )
-    names = [str(k) for k in range(max((np.size(value) for value in table.values()), default=1))]
-    ports = {group: [{"name": f"{letter}{k}"} for k in names] for group, letter in (("inputs", "u"), ("outputs", "y"))}
+    loops = max((np.size(value) for value in table.values()), default=1) if form in ("pid", "ideal_pid") else 1
+    ports = {group: [{"name": f"{letter}{k}"} for k in range(loops)] for group, letter in (("inputs", "u"), ("outputs", "y"))}
     data = {"sample_time": dt, **ports, "estimation": [{"file": "none"}]}
-    _native.check_settings(plain({"name": "loop", "data": data, "controller": {form: {"feedback": "negative", **table}}}))
-    return pid_model(form, table, dt)
+    settings = plain({"name": "loop", "data": data, "controller": {form: {**table, "feedback": "positive"}}})
+    a, b, c, d, dt = _native.controller_model(settings, dt)
+    return Model(a, b, c, d, dt=dt, name="controller")
 
 
 def _of_file(path: Any, what: str) -> Model:

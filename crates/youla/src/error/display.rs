@@ -8,6 +8,11 @@ pub(super) fn worst_pole(pole: Option<c64>) -> String {
     pole.map_or(String::new(), |p| format!("; the worst pole is {}", Pole(p)))
 }
 
+/// A relative residual in brackets; nothing where none was computed.
+pub(super) fn in_brackets(residual: f64) -> String {
+    if residual.is_nan() { String::new() } else { format!(" (relative residual {residual:.1e})") }
+}
+
 /// Prints a pole as `-1.2 + 3.4i` with its magnitude.
 pub struct Pole(pub c64);
 

@@ -13,7 +13,7 @@ pub use display::{Names, Pole, Seconds, Value, short};
 pub use limits::OrderLimit;
 pub use names::{misspelt, nearest_name};
 
-use display::worst_pole;
+use display::{in_brackets, worst_pole};
 use faer::c64;
 
 /// Result of every fallible function of the library.
@@ -105,7 +105,7 @@ pub enum Error {
         pole: c64,
     },
     /// A matrix equation has no solution of the kind that was asked for.
-    #[error("{what} has no solution: {condition} (relative residual {residual:.1e})")]
+    #[error("{what} has no solution: {condition}{}", in_brackets(*residual))]
     NoSolution {
         /// Which equation.
         what: String,

@@ -17,7 +17,7 @@ pub enum IsoZone {
 
 impl IsoZone {
     /// The zone of a peak sensitivity.
-    pub(crate) fn of(peak: f64) -> Self {
+    pub fn of(peak: f64) -> Self {
         match peak {
             _ if peak < 3.0 => IsoZone::A,
             _ if peak < 4.0 => IsoZone::B,

@@ -38,6 +38,7 @@ mod tests;
 pub use super::subspace::Experiment;
 pub use super::verdict::LoopRatio;
 pub use super::verdict::limits::LARGEST_IN_BAND;
+pub use choose::solve::INDISTINCT;
 pub use deviation::interpolation::INTERPOLATION_POINTS;
 pub use deviation::mode_estimates::ModeEstimate;
 pub use deviation::region::{Draw, Interval, Region, RegionParts};

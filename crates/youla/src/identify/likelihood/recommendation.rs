@@ -60,7 +60,7 @@ impl Recommendation {
                 "Not trusted for this loop: the stated controller disagrees with the log, the model passes its {} other tests",
                 required - 1
             ),
-            (n, _) => format!("Not trusted: {n} of {required} tests of the recommended model are not passed"),
+            (n, _) => format!("Not trusted: the recommended model does not pass {n} of the {required} required tests"),
         };
         let bands: Vec<String> =
             self.bands.iter().map(|[low, high]| format!("{} to {} Hz", figure(*low), figure(*high))).collect();
@@ -86,7 +86,7 @@ impl Recommendation {
     }
 
     /// Whether a failed test is about the model, so that its own region is no evidence; the tests [`OF_LOOP`] are about the loop.
-    fn in_doubt(&self) -> bool {
+    pub fn in_doubt(&self) -> bool {
         let of_loop = |e: &Evidence| OF_LOOP.iter().any(|name| e.question.ends_with(name));
         self.evidence.iter().any(|e| !e.holds() && !of_loop(e))
     }
@@ -226,6 +226,14 @@ impl Evidence {
         Evidence { note: note.into(), ..self }
     }
 
+    /// The figure as text: its distance from the limit where it rounds to the limit without being it.
+    pub fn value(&self) -> String {
+        let (rounded, over) = (figure(self.figure), self.figure - self.limit);
+        let alike = over != 0.0 && rounded.parse() == Ok(self.limit);
+        let sign = if over < 0.0 { "-" } else { "+" };
+        if alike { format!("{} {sign} {:.1e}", self.limit, over.abs()) } else { rounded }
+    }
+
     /// Whether the test is passed, or is not required.
     pub fn holds(&self) -> bool {
         !self.required || self.outcome == Outcome::Passed
@@ -237,11 +245,7 @@ impl std::fmt::Display for Evidence {
         if self.outcome == Outcome::NotTested {
             return write!(f, "{}: not tested, {}", self.question, self.note);
         }
-        // A figure that rounds to its limit and is not the limit has more digits.
-        let rounded = figure(self.figure);
-        let alike = rounded.parse() == Ok(self.limit) && self.figure != self.limit;
-        let value = if alike { format!("{:.6}", self.figure) } else { rounded };
-        write!(f, "{} {value} (limit {})", self.question, self.limit)?;
+        write!(f, "{} {} (limit {})", self.question, self.value(), self.limit)?;
         if let Some([low, high]) = self.hz {
             match low == high {
                 true => write!(f, " at {} Hz", figure(low))?,

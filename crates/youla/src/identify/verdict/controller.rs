@@ -49,6 +49,7 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
         if beyond {
             note += " but for those after the largest ones: they were logged before a limit";
         }
+        note += &left_out(&residuals, &all);
         return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(note)));
     }
     let lines: Vec<[Vec<c64>; 3]> = all
@@ -80,16 +81,18 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
         )));
     }
     let worst = worst(law, &gain, plant, |share| excess.near(share, channels.m * channels.p))?;
-    let at_limit: usize = residuals.iter().map(|r| r.left_out).sum();
-    let samples: usize = all.iter().map(|r| r.seen.nrows()).sum();
-    let mut note = format!("the law leaves {:.2} % of the inputs", 100.0 * share);
-    if at_limit > 0 {
-        let part = 100.0 * at_limit as f64 / samples.max(1) as f64;
-        note += &format!("; {part:.2} % of the samples are at a limit and left out");
-    }
+    let note = format!("the law leaves {:.2} % of the inputs{}", 100.0 * share, left_out(&residuals, &all));
     let [figure, hz, significance] = worst;
     let evidence = Evidence::new(QUESTION, figure, LARGEST_CONTROLLER_ERROR).noted(note).at([hz, hz]);
     Ok(Some(evidence.beyond_chance(significance)))
+}
+
+/// Which part of the samples is at a limit, in words; nothing where none is.
+fn left_out(residuals: &[Residual], records: &[&LoopSignals<'_>]) -> String {
+    let at_limit: usize = residuals.iter().map(|r| r.left_out).sum();
+    let samples: usize = records.iter().map(|r| r.seen.nrows()).sum();
+    let part = 100.0 * at_limit as f64 / samples.max(1) as f64;
+    if at_limit > 0 { format!("; {part:.2} % of the samples are at a limit and left out") } else { String::new() }
 }
 
 /// Whether the stated controller reproduces the logged inputs closely enough to be used in the estimate.

@@ -20,7 +20,7 @@ const SHORTEST: usize = 500;
 /// Rounds of models one step away.
 const ROUNDS: usize = 16;
 /// Differences of the criterion that decide neither between dead times nor for a direct path: odds of e^4 to one.
-pub(super) const INDISTINCT: f64 = 8.0;
+pub const INDISTINCT: f64 = 8.0;
 /// Difference of the criterion up to which a model with fewer states may owe it to a wrong dead time. Two samples cost 23 with
 /// 12 000 samples of 10 dB; distinctly wrong orders cost hundreds.
 const WRONG_DELAY: f64 = 60.0;

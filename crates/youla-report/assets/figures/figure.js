@@ -45,9 +45,9 @@ const valuesOf = ({ content }) => (content.curves ?? content.boxes ?? []).flatMa
 const hides = panel => panel.y.range && !panel.equal && !panel.content.cells && valuesOf(panel).some(v => ["below", "above"].includes(placeOf(v, panel.y.range, panel.y.log)));
 const goesOn = ({ content, x, y, equal }) => content.curves?.some(c => x.range && c.x.some(v => v < x.range[0] || v > x.range[1]) || equal && y.range && c.y.some(v => v < y.range[0] || v > y.range[1]));
 
-// How many points of clouds are at the edges.
+// How many points of clouds are at the edges; in a plane those beyond the view are not drawn.
 function countsInWords(figure) {
-  const said = figure.panels.flatMap(panel => {
+  const said = figure.panels.filter(panel => !panel.equal).flatMap(panel => {
     const clouds = inOrder((panel.content.curves ?? []).filter(curve => curve.drawn === "points")).map(curve => {
       const count = (...places) => curve.y.filter(v => places.includes(placeOf(v, panel.y.range ?? [-Infinity, Infinity], panel.y.log))).length, [beyond, missing] = [count("below", "above"), count("missing")];
       const words = [beyond ? `${beyond} beyond the axis` : "", missing ? `${missing} without a value` : ""].filter(Boolean).join(" and ");
@@ -96,8 +96,10 @@ function stack(host, panels, { figure, legend, state, beside, place }) {
   if (equal) fit(first.x.range ?? all, first.y.range ?? extent(panels, "y"));
   let linking = false, plots = [];
   panels.forEach((panel, k) => {
-    if (panel.title) root.append(element("p", { class: "panel-title" }, panel.title));
-    plots.push(makePlot(root, panel, { last: k === panels.length - 1, x, whole, extent: equal ? view.x : reach, width: width(), height: heights[k], key, legend, state, view, zoomed: (a, b) => a ? zoom(a, b) : home(), moved: link, read: u => { if (u === plots[0]?.u) read(); } }));
+    // A name that has no room beside the axis stands above it.
+    const named = isTooLong(panel.y, heights[k]), title = [panel.title, named ? panel.y.label : ""].filter(Boolean).join(": ");
+    if (title) root.append(element("p", { class: "panel-title" }, title));
+    plots.push(makePlot(root, panel, { named, last: k === panels.length - 1, x, whole, extent: equal ? view.x : reach, width: width(), height: heights[k], key, legend, state, view, zoomed: (a, b) => a ? zoom(a, b) : home(), moved: link, read: u => { if (u === plots[0]?.u) read(); } }));
   });
   if (boxes) host.append(boxNames(plots[0], boxesOf(first), first.y.range ?? [-Infinity, Infinity], first.y.log));
   root.append(where);

@@ -45,7 +45,8 @@ function entriesOf(figure) {
     for (const region of regions) add(region, { area: 0.3 });
     for (const cell of content.cells?.cells ?? []) if (cell.method) add({ method: cell.method }, { area: 0.7 });
   }
-  const list = inOrder(entries.values());
+  // What has a note of its own stands behind the method itself.
+  const list = inOrder([...entries.values()].sort((a, b) => !!a.note - !!b.note));
   // Further lines of a method have dashes of their own, further clouds are hollow.
   const nth = (entry, kind) => list.filter(other => other.method === entry.method && other.kinds[kind]).indexOf(entry);
   for (const entry of list) {

@@ -2,7 +2,7 @@
 // drawn on its canvas. What a cloud has beyond the vertical range stands in a strip at that edge, a row for each cloud: triangles for
 // values beyond, crosses at the lower edge where there is no value.
 
-const LEFT = 72, RIGHT = 20, FONT = 12, STRIP = 11, GAP = 4, MARKS = { points: 2.3, dots: 3.6, marks: 3.6 };
+const LEFT = 86, RIGHT = 20, FONT = 12, STRIP = 11, GAP = 4, MARKS = { points: 2.3, dots: 3.6, marks: 3.6 };
 const rising = list => list.every((v, k) => k === 0 || v >= list[k - 1]);
 const isWhole = lists => lists.every(list => list.every(v => v == null || Number.isInteger(v)));
 
@@ -22,7 +22,24 @@ function placeOf(value, [low, high], log) {
   return value > high ? "above" : "inside";
 }
 
-// `at` says how the panel stands: { last, x, extent, width, height, key, legend, state, view, zoomed, moved }.
+// Whether the name of a vertical axis is longer than the axis.
+const ruler = document.createElement("canvas").getContext("2d");
+function isTooLong(axis, height) {
+  ruler.font = `${FONT}px ${colour("--sans")}`;
+  return ruler.measureText(withUnit(axis)).width > height;
+}
+
+// Places of neighbouring points where an area is, one list for each piece without a gap.
+function pieces({ high }) {
+  const found = [];
+  high.forEach((v, k) => {
+    if (v == null) return;
+    k > 0 && high[k - 1] != null ? found[found.length - 1].push(k) : found.push([k]);
+  });
+  return found;
+}
+
+// `at` says how the panel stands: { last, named, x, extent, width, height, key, legend, state, view, zoomed, moved }.
 function makePlot(root, panel, at) {
   const { y } = panel, { legend, state, height } = at, curves = panel.content.curves ?? [], boxes = boxesOf(panel);
   const lines = curves.filter(c => c.drawn === "line"), plain = lines.filter(c => !panel.equal && rising(c.x)), traced = lines.filter(c => !plain.includes(c));
@@ -55,7 +72,7 @@ function makePlot(root, panel, at) {
       axes: [
         { ...axis, space: 64, size: at.last ? 26 : 4, label: at.last && !boxes ? label(at.x) : null, labelSize: boxes ? 0 : 20, ...steps(at.whole), ...(at.x.log ? log : {}),
           values: (u, splits) => !at.last || boxes ? splits.map(() => "") : at.x.log ? logLabels(splits) : tickLabels(splits), ...(boxes ? { grid: { show: false }, ticks: { show: false } } : {}) },
-        { ...axis, space: height < 120 ? 18 : 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: label(y), values: (u, splits) => tickLabels(splits),
+        { ...axis, space: height < 120 ? 18 : 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: at.named ? prettyUnit(y.unit) || null : label(y), values: (u, splits) => tickLabels(splits),
           ...steps(curves.length && isWhole(curves.map(c => c.y))), ...(y.unit === "deg" ? { incrs: [5, 15, 30, 45, 90, 180, 360, 720] } : {}), ...(y.log ? log : {}),
           ...(clouds.length ? { filter: inside, grid: { ...axis.grid, filter: inside }, ticks: { ...axis.ticks, filter: inside } } : {}) },
         ...(other ? [other] : []),
@@ -67,7 +84,7 @@ function makePlot(root, panel, at) {
 
   // Ends of the vertical axis: its range, or all that is shown, and room for the strips.
   function ends(low, high) {
-    if (panel.equal) return at.view.y;
+    if (panel.equal) return now.limits = at.view.y;
     const given = y.range && !state.everything, rest = [...shown(clouds), ...shown(marks), ...shown(traced)].map(c => c.y);
     const areas = shown(panel.regions ?? []).flatMap(r => [r.low, r.high]);
     now.limits = given ? y.range : padded([low, high, ...[...rest, ...areas].flat()], y.log);
@@ -115,12 +132,14 @@ function makePlot(root, panel, at) {
   function behind() {
     clipped(ctx => {
       for (const region of shown(panel.regions ?? [])) {
-        const known = region.x.map((_, k) => k).filter(k => region.high[k] != null);
         Object.assign(ctx, { fillStyle: ink(region), globalAlpha: styleOf(region.method).order ? 0.24 : 0.12 });
         ctx.beginPath();
-        known.forEach(k => ctx.lineTo(X(region.x[k]), Y(region.high[k])));
-        // An area without a lower edge is open: it ends at the frame.
-        known.reverse().forEach(k => ctx.lineTo(X(region.x[k]), region.low[k] == null ? ctx.canvas.height : Y(region.low[k])));
+        for (const piece of pieces(region)) {
+          piece.forEach((k, n) => ctx[n ? "lineTo" : "moveTo"](X(region.x[k]), Y(region.high[k])));
+          // An area without a lower edge is open: it ends at the frame.
+          piece.reverse().forEach(k => ctx.lineTo(X(region.x[k]), region.low[k] == null ? ctx.canvas.height : Y(region.low[k])));
+          ctx.closePath();
+        }
         ctx.fill();
       }
       ctx.globalAlpha = 1;

@@ -46,7 +46,7 @@ pub struct Deviation {
     pub parts: Vec<DeviationPart>,
     /// Largest deviation of a band of validity, per cent.
     pub limit: f64,
-    /// Bands of validity, Hz.
+    /// Bands of validity, Hz; none where the model itself is in doubt.
     pub bands: Vec<[f64; 2]>,
 }
 

@@ -1,6 +1,7 @@
 //! Frequency responses as magnitude and phase, with the bands of the magnitude, and the coherence of the indirect response.
 
 use super::choice::Chosen;
+use super::deviation;
 use super::verification::channel;
 use super::{RunFigure, axis, choice, frequency_in_both_units, key, logarithmic, span};
 use crate::data::{Band, Deviation, FrequencyResponse, Indirect, LineLevels, ModelResponse};
@@ -83,7 +84,7 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         panels.push(panel(y, pair.indirect.iter().map(line).collect(), Some(0.4)));
     }
     let ends = span(pair.hz.iter().copied()).unwrap_or([0.0, f64::INFINITY]);
-    panels.extend(pair.deviation.map(|deviation| Panel { x: x.clone(), ..of_deviation(deviation, ends) }));
+    panels.extend(pair.deviation.map(|of| Panel { x: x.clone(), ..deviation::panel(of, ends) }));
     Figure {
         key: pair.key.clone(),
         title: format!("Frequency response, {}", pair.title),
@@ -91,39 +92,6 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         choice: choice(&[("View", "Bode"), ("Response of", &pair.title)]),
         panels,
         ..Figure::default()
-    }
-}
-
-/// The deviation and its causes over the frequencies of the models; filled below the limit where the response is valid.
-fn of_deviation(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
-    let places: Vec<usize> = (0..deviation.hz.len()).filter(|k| (first..=last).contains(&deviation.hz[*k])).collect();
-    let kept = |values: &[f64]| -> Vec<f64> { places.iter().map(|k| values[*k]).collect() };
-    let (hz, total) = (&kept(&deviation.hz), &kept(&deviation.total));
-    let Deviation { parts, limit, bands, .. } = deviation;
-    let line = |note: &str, y: &[f64]| Curve {
-        method: "likelihood".into(),
-        note: note.into(),
-        x: hz.clone(),
-        y: y.to_vec(),
-        ..Curve::default()
-    };
-    let curves =
-        std::iter::once(line("", total)).chain(parts.iter().map(|part| line(&part.cause, &kept(&part.percent))));
-    let valid = |hz: &f64| bands.iter().any(|[low, high]| (*low..=*high).contains(hz));
-    let floor = span(total.iter().copied().filter(|v| *v > 0.0)).map_or(0.1 * limit, |[low, _]| low.min(0.1 * limit));
-    let ceiling = span(total.iter().copied()).map_or(*limit, |[_, high]| high.clamp(2.0 * limit, 10.0 * limit));
-    Panel {
-        y: Axis { range: Some([0.3 * floor, ceiling]), ..logarithmic("Deviation", "%") },
-        content: Content::Curves(curves.collect()),
-        regions: vec![Region {
-            method: "likelihood".into(),
-            note: format!("valid to {limit} %"),
-            x: hz.clone(),
-            low: vec![f64::NAN; hz.len()],
-            high: hz.iter().map(|hz| if valid(hz) { *limit } else { f64::NAN }).collect(),
-        }],
-        height: Some(0.6),
-        ..Panel::default()
     }
 }
 
@@ -142,13 +110,7 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
     } else if !pair.indirect.is_empty() {
         text += " Points: the response that was measured.";
     }
-    if let Some(deviation) = pair.deviation {
-        text += &format!(
-            " Below: the standard deviation of the recommended response by its causes, in per cent of its magnitude; filled where it is at \
-             most {} %, the bands of validity.",
-            deviation.limit
-        );
-    }
+    text += &pair.deviation.map_or_else(String::new, deviation::caption);
     if let Some(band) = pair.bands.first() {
         let name = |band: &&Band| {
             let found = chosen.data.methods.iter().find(|method| method.key == band.method);

@@ -7,6 +7,7 @@
 //! | `verification` | measured, predicted, residual |
 //! | `residuals` | correlations with the band of noise |
 //! | `bode`, `nyquist` | frequency responses |
+//! | `deviation` | deviation of the recommended response by its causes |
 //! | `levels` | response without a model, noise, distortion |
 //! | `singular` | singular values over frequency |
 //! | `poles`, `pole_grid` | pole map and its grid |
@@ -15,6 +16,7 @@
 
 mod bode;
 mod choice;
+mod deviation;
 mod levels;
 mod nyquist;
 mod order;

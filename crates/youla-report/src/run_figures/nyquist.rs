@@ -4,9 +4,9 @@
 
 use super::bode::{FADED, Pair, is_clear, pairs, percent};
 use super::choice::Chosen;
-use super::{RunFigure, axis, choice};
+use super::{RunFigure, axis, choice, span};
 use crate::data::{Band, Indirect, ModelResponse};
-use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
+use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 use std::f64::consts::TAU;
 
 /// Most regions of a curve, and points of each.
@@ -39,14 +39,15 @@ fn figure(pair: &Pair) -> Figure {
     let axes = [line([-FAR, FAR], [0.0, 0.0]), line([0.0, 0.0], [-FAR, FAR])];
     let marked = pair.models.iter().find(|model| model.method == "hansen").or(pair.models.first());
     let frequencies = marked.map_or_else(Vec::new, |model| frequencies(pair.hz, model));
+    let seen = seen(pair);
     Figure {
         key: pair.key.clone(),
         title: format!("Locus, {}", pair.title),
         caption: format!("Frequency response, {}, over positive frequencies.{said}{ellipses}", pair.title),
         choice: choice(&[("View", "Nyquist"), ("Response of", &pair.title)]),
         panels: vec![Panel {
-            x: axis("Real part", &pair.unit),
-            y: axis("Imaginary part", &pair.unit),
+            x: Axis { range: seen.map(|[x, _]| x), ..axis("Real part", &pair.unit) },
+            y: Axis { range: seen.map(|[_, y]| y), ..axis("Imaginary part", &pair.unit) },
             content: Content::Curves(curves),
             guides: axes.into_iter().chain(frequencies).collect(),
             equal: true,
@@ -55,6 +56,29 @@ fn figure(pair: &Pair) -> Figure {
         }],
         ..Figure::default()
     }
+}
+
+/// Largest distance of a point from the origin over that of the models, beyond which it is not in the first view.
+const STRAY: f64 = 2.0;
+
+/// What the models with a region need, all models where none has one, and the points that are not far beyond; wider by a twentieth.
+fn seen(pair: &Pair) -> Option<[[f64; 2]; 2]> {
+    let has_region = |model: &&&ModelResponse| pair.bands.iter().any(|band| band.method == model.method);
+    let none = !pair.models.iter().any(|model| has_region(&model));
+    let of_model = |model: &&ModelResponse| -> Vec<(f64, f64)> {
+        model.magnitude_db.iter().zip(&model.phase_deg).map(|(db, deg)| place(*db, *deg)).collect()
+    };
+    let loci: Vec<(f64, f64)> =
+        pair.models.iter().filter(|model| none || has_region(model)).flat_map(of_model).collect();
+    let largest = loci.iter().map(|(re, im)| re.hypot(*im)).filter(|size| size.is_finite()).fold(0.0, f64::max);
+    let points = pair.indirect.iter().flat_map(|measured| {
+        let curve = measured_points(measured);
+        curve.x.into_iter().zip(curve.y).filter(|(re, im)| re.hypot(*im) <= STRAY * largest).collect::<Vec<_>>()
+    });
+    let all: Vec<(f64, f64)> = loci.iter().copied().chain(points).collect();
+    let wider = |[low, high]: [f64; 2]| [low - 0.05 * (high - low), high + 0.05 * (high - low)];
+    let ends = [span(all.iter().map(|at| at.0))?, span(all.iter().map(|at| at.1))?];
+    (largest > 0.0).then(|| ends.map(wider))
 }
 
 fn locus(hz: &[f64], model: &ModelResponse) -> Curve {

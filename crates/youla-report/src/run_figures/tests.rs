@@ -121,11 +121,11 @@ fn report() -> ReportData {
                 ..LineLevels::default()
             }],
             deviations: vec![Deviation {
-                hz: vec![hz[0] / 2.0, hz[1], hz[2], hz[3]],
-                total: vec![50.0, 20.0, 5.0, 4.0],
-                parts: vec![DeviationPart { cause: "noise".into(), percent: vec![50.0, 12.0, 4.0, 4.0] }],
+                hz: vec![hz[0] / 2.0, hz[1], hz[2], hz[3], hz[4], hz[5]],
+                total: vec![50.0, 20.0, 5.0, 4.0, 11.0, 3.0],
+                parts: vec![DeviationPart { cause: "noise".into(), percent: vec![50.0, 12.0, 4.0, 4.0, 9.0, 3.0] }],
                 limit: 10.0,
-                bands: vec![[hz[2], hz[3]]],
+                bands: vec![[hz[2], hz[3]], [hz[5], hz[5]]],
                 ..Deviation::default()
             }],
             singular: vec![SingularValue { method: "hansen".into(), place: 0, value_db: vec![3.0; hz.len()] }],
@@ -186,6 +186,45 @@ fn every_figure_is_whole_in_every_size_and_always_the_same() {
 }
 
 #[test]
+fn deviations_have_a_style_for_each_cause_and_are_filled_in_their_bands_only() {
+    let figure = &drawn(RunFigure::Bode, &FigureChoice::default())[0].figure;
+    let deviation = curves(figure, 3);
+    let keys: Vec<&str> = deviation.iter().map(|curve| curve.method.as_str()).collect();
+    assert_eq!(keys, ["deviation, all causes", "deviation, noise"]);
+    assert_eq!(deviation[0].y, [20.0, 5.0, 4.0, 11.0, 3.0]);
+    let filled: Vec<bool> = figure.panels[3].regions[0].high.iter().map(|high| *high == 10.0).collect();
+    assert_eq!(filled, [false, true, true, false, true]);
+    assert!(
+        figure.caption.contains("filled in the bands of validity")
+            && figure.caption.contains("noise: the noise of the")
+    );
+
+    let mut doubted = report();
+    doubted.frequency.iter_mut().flat_map(|of| &mut of.deviations).for_each(|of| of.bands.clear());
+    let figure = &run_drawings(&doubted, RunFigure::Bode, &FigureChoice::default()).unwrap()[0].figure;
+    assert!(figure.panels[3].regions.is_empty() && !figure.caption.contains("bands of validity"));
+}
+
+/// A point a thousand times as far out as the models is not in the first view of a locus.
+#[test]
+fn a_stray_point_does_not_decide_the_view_of_a_locus() {
+    let mut data = report();
+    let view = |data: &ReportData| {
+        let figure = run_drawings(data, RunFigure::Nyquist, &FigureChoice::default()).unwrap().remove(0).figure;
+        (figure.panels[0].x.range.unwrap(), figure.panels[0].y.range.unwrap())
+    };
+    let first = |data: &mut ReportData, coherence: f64, decibels: f64| {
+        let measured = &mut data.frequency.as_mut().unwrap().indirect[0];
+        measured.coherence[0] = coherence;
+        measured.magnitude_db[0] += decibels;
+    };
+    first(&mut data, 0.0, 0.0);
+    let before = view(&data);
+    first(&mut data, 1.0, 60.0);
+    assert_eq!(view(&data), before);
+}
+
+#[test]
 fn responses_are_those_of_the_report() {
     let data = report();
     let frequency = data.frequency.as_ref().unwrap();
@@ -202,12 +241,6 @@ fn responses_are_those_of_the_report() {
     let points: Vec<&Curve> = curves(figure, 0).iter().filter(|curve| curve.method == "indirect").collect();
     assert_eq!(points.iter().map(|curve| curve.x.len()).collect::<Vec<_>>(), [37, 23]);
     assert_eq!(figure.panels[0].shades.len(), 1);
-    // The deviation over the frequencies of the models, filled where it is within the limit.
-    let deviation = curves(figure, 3);
-    assert_eq!(deviation.iter().map(|c| c.note.as_str()).collect::<Vec<_>>(), ["", "noise"]);
-    assert_eq!(deviation[0].y, [20.0, 5.0, 4.0]);
-    let filled: Vec<bool> = figure.panels[3].regions[0].high.iter().map(|high| *high == 10.0).collect();
-    assert_eq!(filled, [false, true, true]);
     assert_eq!(bode[1].figure.panels.len(), 3);
 
     let nyquist = &drawn(RunFigure::Nyquist, &FigureChoice::default())[0].figure;

@@ -23,7 +23,13 @@ const BEFORE: [(&str, Style); 6] = [
     ("indirect", style("--indirect", "#e69f00", 0.7, &[], Marker::Circle)),
     ("band of noise", style("--soft", "#59616b", 0.6, &[2.0, 1.5], Marker::Square)),
 ];
-const AFTER: [(&str, Style); 5] = [
+const AFTER: [(&str, Style); 11] = [
+    ("deviation, all causes", style("--recommended", "#c2185b", 1.15, &[], Marker::Circle)),
+    ("deviation, noise", style("--recommended", "#c2185b", 0.8, &[1.2, 1.2], Marker::Circle)),
+    ("deviation, choice", style("--recommended", "#c2185b", 0.8, &[4.0, 1.0, 1.0, 1.0], Marker::Circle)),
+    ("deviation, variation", style("--recommended", "#c2185b", 0.8, &[7.0, 2.0], Marker::Circle)),
+    ("deviation, distortion", style("--recommended", "#c2185b", 0.8, &[2.5, 2.5], Marker::Circle)),
+    ("band of validity", style("--good", "#00704f", 0.6, &[], Marker::Square)),
     ("new pole", style("--soft", "#59616b", 0.7, &[], Marker::Plus)),
     ("unstable pole", style("--bad", "#b3261e", 0.7, &[], Marker::Cross)),
     ("two standard deviations", style("--nominal", "#7f868e", 0.5, &[], Marker::Plus)),

@@ -81,7 +81,7 @@ fn deviations(found: &Identification) -> Result<Vec<draw::Deviation>> {
             total: percent(&region.absolute),
             parts: region.parts.named().into_iter().filter_map(part).collect(),
             limit: 100.0 * LARGEST_IN_BAND,
-            bands: model.entry_bands[output][input].clone(),
+            bands: if model.in_doubt() { Vec::new() } else { model.entry_bands[output][input].clone() },
         }
     };
     Ok(ports(found).map(entry).collect())

@@ -6,11 +6,12 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::data::{LoopMargins, Method, Mode, ReportData, Role};
+use super::data::{LoopMargins, Method, ReportData, Role};
 use super::drawings::drawings;
 use super::figure::Figure;
 use super::run_figures::{FigureChoice, RunFigure, run_drawings};
-use super::{page, tables};
+use super::tables::ShownMode;
+use super::{numbers, page, tables};
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../assets/report.html");
@@ -36,6 +37,7 @@ pub fn html(data: &ReportData) -> Result<String> {
         report => Serde(without_curves(data)),
         fits => Serde(tables::fit_rows(data)),
         modes => Serde(tables::mode_rows(data)),
+        delay => Serde(numbers::delay_unit(data.sample_time)),
         has => figures.iter().map(|(place, _)| (place.as_str(), true)).collect::<BTreeMap<_, _>>(),
     };
     page::render(TEMPLATE, content, &drawings(&methods, &figures))
@@ -45,7 +47,7 @@ pub fn html(data: &ReportData) -> Result<String> {
 #[derive(Serialize)]
 struct Subject<'a> {
     method: &'a Method,
-    modes: Vec<&'a Mode>,
+    modes: Vec<ShownMode>,
     margins: Option<&'a LoopMargins>,
     largest_pole: Option<f64>,
 }
@@ -57,7 +59,7 @@ fn subject(data: &ReportData) -> Option<Subject<'_>> {
     let certificate = data.certificates.iter().find(|one| one.method == method.key);
     let subject = Subject {
         method,
-        modes: data.modes.iter().filter(|mode| mode.method == method.key).collect(),
+        modes: data.modes.iter().filter(|mode| mode.method == method.key).map(ShownMode::from).collect(),
         margins: data.margins.iter().find(|margins| margins.method == method.key),
         largest_pole: certificate.and_then(|one| one.worst_closed_loop_pole).map(|[re, im]| re.hypot(im)),
     };

@@ -12,6 +12,54 @@ pub fn fit(percent: f64, digits: usize) -> String {
     if percent < -100.0 { "below -100".to_owned() } else { format!("{percent:.digits$}") }
 }
 
+/// Distance from 1 below which a magnitude is written by it: five decimals hold less than two of its digits.
+const NEAR_ONE: f64 = 1e-4;
+
+/// The magnitude of a pole in z: five decimals, the distance from 1 where they hide it.
+///
+/// ```
+/// use youla_report::numbers::radius;
+/// assert_eq!([radius(0.99945), radius(1.0 - 4.1e-6), radius(1.00002), radius(1.0)], ["0.99945", "1 - 4.1e-6", "1 + 2.0e-5", "1"]);
+/// ```
+pub fn radius(value: f64) -> String {
+    match value - 1.0 {
+        0.0 => "1".into(),
+        over if over.abs() >= NEAR_ONE || over.is_nan() => format!("{value:.5}"),
+        over if over < 0.0 => format!("1 - {:.1e}", -over),
+        over => format!("1 + {over:.1e}"),
+    }
+}
+
+/// Most decimals of a bound.
+const MOST_DECIMALS: i32 = 12;
+
+/// A value and its bounds with as many decimals as three significant digits of the value and two of the width need.
+///
+/// ```
+/// use youla_report::numbers::with_bounds;
+/// assert_eq!(with_bounds(21.843, [17.499, 26.187]), ["21.8", "17.5", "26.2"].map(String::from));
+/// assert_eq!(with_bounds(0.99501, [0.995012, 0.995013]), ["0.9950100", "0.9950120", "0.9950130"].map(String::from));
+/// ```
+pub fn with_bounds(value: f64, [low, high]: [f64; 2]) -> [String; 3] {
+    let places = decimals(value, 3).max(decimals(high - low, 2)).clamp(0, MOST_DECIMALS) as usize;
+    [value, low, high].map(|v| format!("{v:.places$}"))
+}
+
+/// Factors between which a gain may lie: at least two decimals, and two significant digits of the smaller distance from 1.
+pub fn factors(low: f64, high: Option<f64>) -> [String; 2] {
+    let nearest = high.map_or(1.0 - low, |high| (1.0 - low).min(high - 1.0));
+    let places = decimals(nearest, 2).clamp(2, MOST_DECIMALS) as usize;
+    [format!("{low:.places$}"), high.map_or("any higher value".into(), |high| format!("{high:.places$}"))]
+}
+
+/// Sample time from which delays of a loop are stated in seconds, not milliseconds.
+const SLOW: f64 = 0.1;
+
+/// Unit in which delays of a loop are stated, and its number in a second.
+pub fn delay_unit(sample_time: Option<f64>) -> (&'static str, f64) {
+    if sample_time.is_some_and(|ts| ts >= SLOW) { ("s", 1.0) } else { ("ms", 1e3) }
+}
+
 /// A vector as it is.
 pub fn many<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let values = Vec::<Option<f64>>::deserialize(deserializer)?;

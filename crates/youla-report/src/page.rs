@@ -4,10 +4,10 @@
 //! is written `\u003c`, so that no text of the user can end the script element or open a comment in it.
 
 use minijinja::syntax::SyntaxConfig;
-use minijinja::{Environment, Value, context};
+use minijinja::{Environment, HtmlEscape, Value, context};
 
 use super::drawings::Drawings;
-use super::numbers::fit;
+use super::numbers::{fit, radius};
 use super::svg::pretty_unit;
 use crate::{Error, Result};
 
@@ -72,11 +72,12 @@ fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
     environment.add_filter("fixed", |value: f64, digits: usize| with_minus(format!("{value:.digits$}")));
     environment.add_filter("fit", |value: f64| with_minus(fit(value, 1)));
+    environment.add_filter("radius", |value: f64| with_minus(radius(value)));
     environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
     environment.add_filter("significant", |value: f64| with_minus(significant(value)));
     environment.add_filter("two_digits", |value: f64| with_minus(digits(value, 2)));
     environment.add_filter("printed", with_minus);
-    environment.add_filter("sentence", with_minus_signs);
+    environment.add_filter("sentence", |text: String| safe(prose(&text)));
     environment.add_filter("unit", |unit: String| pretty_unit(&unit));
     environment.add_filter("magnitude", |pole: Vec<f64>| pole.iter().fold(0.0_f64, |size, part| size.hypot(*part)));
     environment.add_template("page.html", FRAME)?;
@@ -103,13 +104,31 @@ fn digits(value: f64, count: i32) -> String {
     }
 }
 
-/// A text with minus signs before its numbers; hyphens of words and ranges stay.
+/// A text with minus signs, and what it quotes by backticks as code.
+fn prose(text: &str) -> String {
+    let escaped = HtmlEscape(&with_minus_signs(text.to_owned())).to_string();
+    let parts: Vec<&str> = escaped.split('`').collect();
+    // An odd mark at the end quotes nothing.
+    let quotes = parts.len() - 1 - (parts.len() - 1) % 2;
+    let mark = |k: usize| match k {
+        _ if k >= quotes => "`",
+        k if k % 2 == 0 => "<code>",
+        _ => "</code>",
+    };
+    let rest = parts.iter().enumerate().skip(1).map(|(k, part)| format!("{}{part}", mark(k - 1)));
+    std::iter::once(parts[0].to_owned()).chain(rest).collect()
+}
+
+/// A text with minus signs before its numbers and between two; hyphens of words and ranges stay.
 fn with_minus_signs(text: String) -> String {
     let chars: Vec<char> = text.chars().collect();
     let negative = |k: usize| {
         let number = chars.get(k + 1).is_some_and(char::is_ascii_digit);
         let exponent = k > 1 && chars[k - 1] == 'e' && chars[k - 2].is_ascii_digit();
-        number && (exponent || k == 0 || !(chars[k - 1].is_alphanumeric() || "-_/.)]".contains(chars[k - 1])))
+        let spaced = k > 1 && chars[k - 2].is_ascii_digit() && chars[k - 1] == ' ' && chars.get(k + 1) == Some(&' ');
+        let between = spaced && chars.get(k + 2).is_some_and(char::is_ascii_digit);
+        between
+            || number && (exponent || k == 0 || !(chars[k - 1].is_alphanumeric() || "-_/.)]".contains(chars[k - 1])))
     };
     chars.iter().enumerate().map(|(k, c)| if *c == '-' && negative(k) { '\u{2212}' } else { *c }).collect()
 }
@@ -121,7 +140,7 @@ pub fn with_minus(number: String) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::with_minus_signs;
+    use super::{prose, with_minus_signs};
 
     #[test]
     fn numbers_have_minus_signs_and_words_keep_their_hyphens() {
@@ -130,5 +149,12 @@ mod tests {
             text,
             "fit \u{2212}3.5 % (\u{2212}1 dB), 2e\u{2212}5, closed-loop run-001, 10-20 Hz, [\u{2212}1, \u{2212}2]"
         );
+    }
+
+    #[test]
+    fn what_is_quoted_is_code_and_nothing_else_is_markup() {
+        assert_eq!(prose("by `skip` or `segments`."), "by <code>skip</code> or <code>segments</code>.");
+        assert_eq!(prose("<b> of `a"), "&lt;b&gt; of `a");
+        assert_eq!(prose("|z| = 1 - 4.1e-6"), "|z| = 1 \u{2212} 4.1e\u{2212}6");
     }
 }

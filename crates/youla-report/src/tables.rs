@@ -51,10 +51,62 @@ pub(super) fn fit_rows(data: &ReportData) -> Vec<FitRow> {
         .collect()
 }
 
+/// What a mode is, in every table the same.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Nature {
+    /// A pair that decays.
+    Pair,
+    /// A pair that grows.
+    GrowingPair,
+    /// A pair that grows by less than two standard deviations of its damping ratio.
+    PerhapsGrowingPair,
+    /// A real pole that decays.
+    Real,
+    /// A real pole that grows.
+    GrowingReal,
+    /// A real pole within two standard deviations of an integrator, on either side.
+    NearIntegrator,
+    /// A pole at 1.
+    Integrator,
+}
+
+/// Standard deviations within which a mode is not told from its neighbour on the other side of the boundary of stability.
+const TOLD: f64 = 2.0;
+
+impl Nature {
+    fn of(mode: &Mode) -> Self {
+        let within = |size: f64, k: usize| mode.deviation.is_some_and(|deviation| size < TOLD * deviation[k]);
+        match mode.zeta {
+            _ if mode.hz == 0.0 => Nature::Integrator,
+            zeta if zeta.abs() >= 1.0 && within(mode.hz, 0) => Nature::NearIntegrator,
+            zeta if zeta >= 1.0 => Nature::Real,
+            zeta if zeta <= -1.0 => Nature::GrowingReal,
+            zeta if zeta < 0.0 && within(-zeta, 1) => Nature::PerhapsGrowingPair,
+            zeta if zeta < 0.0 => Nature::GrowingPair,
+            _ => Nature::Pair,
+        }
+    }
+}
+
+/// A mode as the tables show it.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub(super) struct ShownMode {
+    #[serde(flatten)]
+    pub(super) mode: Mode,
+    pub(super) nature: Nature,
+}
+
+impl From<&Mode> for ShownMode {
+    fn from(mode: &Mode) -> Self {
+        ShownMode { mode: mode.clone(), nature: Nature::of(mode) }
+    }
+}
+
 /// A mode that several models have, one place per method.
 #[derive(Debug, Serialize, PartialEq)]
 pub(super) struct ModeRow {
-    pub(super) cells: Vec<Option<Mode>>,
+    pub(super) cells: Vec<Option<ShownMode>>,
 }
 
 /// Modes by rising frequency; those of each method are compared with the first ones in their rows.
@@ -62,17 +114,17 @@ pub(super) fn mode_rows(data: &ReportData) -> Vec<ModeRow> {
     let mut rows: Vec<ModeRow> = Vec::new();
     for (column, method) in data.methods.iter().enumerate() {
         let own: Vec<&Mode> = data.modes.iter().filter(|mode| mode.method == method.key).collect();
-        let first: Vec<&Mode> = rows.iter().filter_map(|row| row.cells.iter().flatten().next()).collect();
+        let first: Vec<&Mode> = rows.iter().filter_map(|row| Some(&row.cells.iter().flatten().next()?.mode)).collect();
         let places = match_modes(&own, &first);
         for (mode, place) in own.into_iter().zip(places) {
             let place = place.unwrap_or_else(|| {
                 rows.push(ModeRow { cells: vec![None; data.methods.len()] });
                 rows.len() - 1
             });
-            rows[place].cells[column] = Some(mode.clone());
+            rows[place].cells[column] = Some(mode.into());
         }
     }
-    let hz = |row: &ModeRow| row.cells.iter().flatten().next().map_or(0.0, |mode| mode.hz);
+    let hz = |row: &ModeRow| row.cells.iter().flatten().next().map_or(0.0, |shown| shown.mode.hz);
     rows.sort_by(|a, b| hz(a).total_cmp(&hz(b)));
     rows
 }
@@ -108,9 +160,22 @@ mod tests {
     fn modes_of_one_method_never_share_a_place() {
         let frequencies: Vec<Vec<Option<f64>>> = mode_rows(&data())
             .iter()
-            .map(|row| row.cells.iter().map(|cell| cell.as_ref().map(|mode| mode.hz)).collect())
+            .map(|row| row.cells.iter().map(|cell| cell.as_ref().map(|shown| shown.mode.hz)).collect())
             .collect();
         let expected = [[None, Some(54.0), Some(54.9)], [None, Some(56.0), None], [None, None, Some(120.0)]];
         assert_eq!(frequencies, expected);
+    }
+
+    #[test]
+    fn a_pole_within_its_deviation_of_an_integrator_is_none_that_grows() {
+        let nature =
+            |hz, zeta, deviation| Nature::of(&Mode { method: String::new(), hz, zeta, deviation, residue: Vec::new() });
+        assert_eq!(nature(0.01, -1.0, Some([0.12, 0.0])), Nature::NearIntegrator);
+        assert_eq!(nature(0.01, 1.0, Some([0.12, 0.0])), Nature::NearIntegrator);
+        assert_eq!(nature(0.04, -1.0, Some([0.0076, 0.0])), Nature::GrowingReal);
+        assert_eq!(nature(0.04, -1.0, None), Nature::GrowingReal);
+        assert_eq!(nature(0.0, 0.0, None), Nature::Integrator);
+        assert_eq!(nature(0.27, -1e-4, Some([0.01, 0.02])), Nature::PerhapsGrowingPair);
+        assert_eq!(nature(0.27, -0.1, Some([0.01, 0.02])), Nature::GrowingPair);
     }
 }

@@ -87,6 +87,7 @@ fn several_inputs_and_outputs_are_all_inside() {
     }
     for text in [
         "Hansen reduced G_red(S)",
+        "Gap to\u{a0}recommended",
         "y_x",
         "Can I trust it?",
         "3.1e−14",
@@ -119,6 +120,8 @@ fn text_of_the_user_cannot_leave_its_place() {
     let mut data = sample::bearing();
     data.title = evil.into();
     data.settings = evil.into();
+    data.verdict.iter_mut().for_each(|line| line.text = evil.into());
+    data.findings.iter_mut().for_each(|finding| finding.what = evil.into());
     data.outputs[0].name = evil.into();
     data.methods.push(Method::new("other", evil, youla_report::data::Role::Other));
     let page = written("report-hostile", &data);

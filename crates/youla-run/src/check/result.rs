@@ -32,22 +32,20 @@ impl DataCheck {
     }
 
     /// Findings of the same test, severity and channel in several records as one: the first of them, with the number of further
-    /// ones. In the order of the findings.
+    /// records. In the order of the findings; two findings of one record are never one.
     pub(crate) fn grouped(&self) -> Vec<(&Finding, usize)> {
-        let mut groups: Vec<(&Finding, usize)> = Vec::new();
+        let mut groups: Vec<Vec<&Finding>> = Vec::new();
         for finding in &self.findings {
-            let same = |g: &&mut (&Finding, usize)| {
-                let first = g.0;
-                let one_record = first.record == finding.record;
-                (first.test, first.severity, &first.channel) == (finding.test, finding.severity, &finding.channel)
-                    && !one_record
+            let kind = |f: &Finding| (f.test, f.severity, f.channel.clone());
+            let joins = |group: &&mut Vec<&Finding>| {
+                kind(group[0]) == kind(finding) && group.iter().all(|known| known.record != finding.record)
             };
-            match groups.iter_mut().find(same) {
-                Some(group) => group.1 += 1,
-                None => groups.push((finding, 0)),
+            match groups.iter_mut().find(joins) {
+                Some(group) => group.push(finding),
+                None => groups.push(vec![finding]),
             }
         }
-        groups
+        groups.into_iter().map(|group| (group[0], group.len() - 1)).collect()
     }
 
     /// The findings of a severity, grouped, with what is to be said of those like them: at most `most`. Where there are more, those of
@@ -126,6 +124,25 @@ pub fn further(records: usize) -> String {
 mod tests {
     use super::*;
     use std::collections::BTreeMap;
+
+    /// Two notes of one test in each of two records: two groups of two records each.
+    #[test]
+    fn a_group_holds_one_finding_of_each_record() {
+        let note = |record: &str, what: &str| Finding {
+            test: Test::Excitation,
+            severity: Severity::Note,
+            record: record.into(),
+            channel: Some("r".into()),
+            rows: None,
+            what: what.into(),
+            numbers: BTreeMap::new(),
+            advice: String::new(),
+        };
+        let findings = vec![note("a", "weak"), note("a", "empty"), note("b", "weak"), note("b", "empty")];
+        let check = DataCheck { records: Vec::new(), findings };
+        let groups: Vec<(&str, usize)> = check.grouped().iter().map(|(f, more)| (f.what.as_str(), *more)).collect();
+        assert_eq!(groups, [("weak", 1), ("empty", 1)]);
+    }
 
     /// 28 outputs with a note each, and the controller: two lines.
     #[test]

@@ -1,7 +1,9 @@
 //! The recommended model on the page: its tests, what the search chose and why, and the candidates.
 
 use crate::result::Identification;
-use youla::identify::likelihood::{Candidate, Evidence, LikelihoodOptions, Outcome, Recommendation, figure};
+use youla::identify::likelihood::{
+    Candidate, Evidence, INDISTINCT, LikelihoodOptions, Outcome, Recommendation, figure,
+};
 use youla::signal::Detrend;
 use youla_report::data::EvidenceTable;
 
@@ -27,7 +29,7 @@ fn evidence(model: &Recommendation) -> EvidenceTable {
             true => figure(low),
             false => format!("{} to {}", figure(low), figure(high)),
         });
-        let value = if e.outcome == Outcome::NotTested { String::new() } else { figure(e.figure) };
+        let value = if e.outcome == Outcome::NotTested { String::new() } else { e.value() };
         let cells = [value, e.limit.to_string(), at, required.into(), outcome.into(), e.note.clone()];
         std::iter::once(e.question.clone()).chain(cells).collect()
     };
@@ -61,13 +63,14 @@ fn candidates(model: &Recommendation) -> EvidenceTable {
     };
     EvidenceTable {
         title: "Candidates".into(),
-        text: "Order and dead time are those with the least criterion; dead times that the criterion does not separate are decided by \
-               the least gain near the Nyquist frequency."
-            .into(),
-        columns: ["Order", "Dead time, samples", "Criterion above the least", "Start"].map(String::from).to_vec(),
+        text: format!(
+            "Order and dead time are those with the least criterion of the candidates that the controller stabilises; the others come last, \
+             whatever their criterion. A difference up to {INDISTINCT} does not decide: of such dead times that with the least gain near the \
+             Nyquist frequency is taken. Modes that only the noise shows are left to the model of the noise, whatever they gain."
+        ),
+        columns: ["Order", "Dead time, samples", "Criterion above the least of those stabilised", "Start"].map(String::from).to_vec(),
         rows: sorted.iter().take(MOST_CANDIDATES).map(row).collect(),
-        caption: "Schwarz's criterion: -2 log likelihood + log(samples) per parameter. A difference of 10 is strong evidence."
-            .into(),
+        caption: "Schwarz's criterion: -2 log likelihood + log(samples) per parameter. Listed are the candidates for all samples.".into(),
     }
 }
 
@@ -143,7 +146,7 @@ fn means(kind: Detrend) -> Row {
     ["Means".into(), chosen.into(), "kept, mean, straight line".into(), reason.into(), "[data] detrend".into()]
 }
 
-/// By how much the criterion of the best other candidate is larger.
+/// By how much the criterion of the best other candidate is larger, or what decided in spite of it.
 fn margin(model: &Recommendation, other: impl Fn(&Candidate) -> bool, what: &str) -> String {
     let least = |of: &dyn Fn(&&Candidate) -> bool| {
         compared(model)
@@ -152,13 +155,24 @@ fn margin(model: &Recommendation, other: impl Fn(&Candidate) -> bool, what: &str
             .filter(of)
             .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     };
-    let (Some(next), Some(chosen)) = (least(&|c| other(c)), least(&|c| !other(c))) else {
-        return format!("no other {what} was tried");
+    let Some(next) = least(&|c| other(c)) else {
+        return format!("the others were tried on a part of the records; on all of them no other {what} was tried");
     };
     let value = if what == "order" { next.order.to_string() } else { listed(&next.dead_time) };
+    let Some(chosen) = least(&|c| !other(c)) else {
+        return format!("chosen on a part of the records; on all of them the search preferred it to {value}");
+    };
+    let unseen = model.evidence.iter().any(|e| e.question.ends_with("(unseen modes)"));
     match next.criterion - chosen.criterion {
         gap if gap >= 0.0 => format!("the best with another {what}, {value}, has a criterion {gap:.1} larger"),
-        gap => format!("{value} has a criterion {:.1} smaller, too little to prefer it", -gap),
+        gap if -gap <= INDISTINCT => {
+            format!("{value} has a criterion {:.1} smaller, less than the {INDISTINCT} from which it decides", -gap)
+        }
+        gap if unseen => format!(
+            "{value} has a criterion {:.1} smaller, with modes that only the noise shows: they are left to the model of the noise",
+            -gap
+        ),
+        gap => format!("{value} has a criterion {:.1} smaller; a later step of the search decided against it", -gap),
     }
 }
 

@@ -14,7 +14,7 @@ pub enum Method {
     Direct,
     /// G(S).
     Hansen,
-    /// `G_red(S)`.
+    /// The recommended model with fewer states.
     HansenReduced,
     /// The physical structure, by the prediction-error method.
     GreyBox,
@@ -54,7 +54,7 @@ impl Method {
             Method::Nominal => "nominal G(0)",
             Method::Direct => "direct subspace",
             Method::Hansen => "Hansen G(S)",
-            Method::HansenReduced => "reduced G_red(S)",
+            Method::HansenReduced => "reduced",
             Method::GreyBox => "grey-box PEM",
             Method::TruePlant => "true plant",
         }

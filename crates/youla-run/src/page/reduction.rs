@@ -23,7 +23,7 @@ pub(super) fn line(run: &RunReduction) -> Verdict {
 pub(super) fn drawn(run: &RunReduction) -> Reduction {
     let r = &run.found.reduction;
     Reduction {
-        label: format!("G(S) by {}", r.method),
+        label: format!("the recommended model by {}", r.method),
         hankel: r.hankel.clone(),
         chosen: run.found.order(),
         kept: r.kept.len(),

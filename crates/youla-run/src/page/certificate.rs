@@ -3,7 +3,7 @@
 use crate::stages::certificate::RunCertificate;
 use youla::validate::MarginInterval;
 use youla_report::data::{EvidenceTable, ReportPart, Status, Verdict};
-use youla_report::with_minus;
+use youla_report::{numbers, with_minus};
 
 /// The controller on the region of the plant.
 pub(super) fn line(certificate: &RunCertificate) -> Verdict {
@@ -14,29 +14,33 @@ pub(super) fn line(certificate: &RunCertificate) -> Verdict {
 fn sentence(certificate: &RunCertificate) -> String {
     let band = &certificate.band;
     let level = 100.0 * band.level;
-    let [low, high] = band.radius.bounds;
     let stabilises = match band.holds() {
-        true => format!("stabilises all {}", band.within),
-        false => format!("does not stabilise {} of the {}", band.unstable_within, band.within),
+        true => format!("stabilises all {} plants", band.within),
+        false => format!("does not stabilise {} of {} plants", band.unstable_within, band.within),
     };
-    // The interval is of one figure, the region of all parameters at once: it reaches further.
+    let (worst, own) = (numbers::radius(band.worst_within), numbers::radius(band.radius.value));
+    let [_, low, high] = numbers::with_bounds(band.radius.value, band.radius.bounds);
     format!(
-        "The controller {stabilises} models drawn from the {level:.0} % confidence region of the plant; the largest pole of their loops has \
-         |z| = {:.5}. The loop of the model itself has {:.5}, with a {level:.0} % interval of {low:.5} to {high:.5} for this figure alone; \
-         the region holds all parameters at once and is wider.",
-        band.worst_within, band.radius.value
+        "The controller {stabilises} drawn from the {level:.0} % region of all parameters together; the largest pole of their loops has \
+         |z| = {worst}. That region reaches further than the region at one frequency, from which the part of the margin that is left is \
+         computed, and than the interval of one figure: the largest pole of the loop of the model has |z| = {own}, {level:.0} % interval \
+         {low} to {high}."
     )
 }
 
 /// Margins with intervals; none where the loop is unstable.
-pub(super) fn tables(certificate: &RunCertificate) -> Vec<EvidenceTable> {
+pub(super) fn tables(certificate: &RunCertificate, sample_time: f64) -> Vec<EvidenceTable> {
     if certificate.margins.is_empty() {
         return Vec::new();
     }
+    let (unit, of_second) = numbers::delay_unit(Some(sample_time));
     let row = |m: &MarginInterval| {
-        let i = &m.interval;
-        let cells = [format!("{:.3}", i.value), format!("{:.3} to {:.3}", i.bounds[0], i.bounds[1])];
-        std::iter::once(m.name.to_owned()).chain(cells.map(with_minus)).collect()
+        let (name, factor) = match m.name.strip_suffix(", seconds") {
+            Some(what) => (format!("{what}, {unit}"), of_second),
+            None => (m.name.to_owned(), 1.0),
+        };
+        let [value, low, high] = numbers::with_bounds(factor * m.interval.value, m.interval.bounds.map(|b| factor * b));
+        std::iter::once(name).chain([value, format!("{low} to {high}")].map(with_minus)).collect()
     };
     let rows = certificate.margins.iter().map(row).collect();
     vec![EvidenceTable {

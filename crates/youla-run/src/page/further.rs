@@ -1,53 +1,22 @@
-//! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
+//! Lines below the answer to "Can it be trusted?": the loop where nothing is wrong with it, redesign, reduction, physical structure, factors.
 
-use super::{certificate, pid, redesign, reduction};
-use crate::method::Method;
+use super::{loops, pid, redesign, reduction};
 use crate::result::Identification;
 use crate::summary::Summary;
-use youla::control::IsoZone;
 use youla_greybox::hansen_pem::PemStart;
 use youla_report::data::{ReportPart, Status, Verdict};
 
 /// Lines below the answer, each with its evidence.
 pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
+    let of_loop = loops::lines(found, summary).into_iter().filter(|line| !loops::warns(line));
     let lines = [
-        deviation_line(found),
-        found.certified().map(certificate::line),
-        margin_line(found, summary),
         found.new_controller().map(redesign::line),
         found.new_pid().map(pid::line),
         found.reduced().map(reduction::line),
         grey_box_line(found),
         factor_line(summary),
     ];
-    lines.into_iter().flatten().collect()
-}
-
-/// Margins of the loop of the recommended model, of G(S) where there is none; nothing where the loop is unstable, which the answer
-/// states, and where no controller ran.
-fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
-    if found.declared.controller().is_zero() {
-        return None;
-    }
-    let recommended = summary.model(Method::Likelihood).map(|m| (m, "the recommended model"));
-    let (model, name) = recommended.or_else(|| Some((summary.model(Method::Hansen)?, "G(S)")))?;
-    let robustness = &model.robustness;
-    let zone = robustness.iso_14839_zone?;
-    let worst = robustness.output_peak_sensitivities.iter().flatten().flatten().copied().fold(0.0, f64::max);
-    let disk = robustness.output_disk_margin.as_ref()?;
-    let highest = disk.highest_gain.map_or("any higher value".into(), |g| format!("{g:.2}"));
-    let text = format!(
-        "The peak sensitivity of the loop with {name} is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for all \
-         outputs together. The loop stays stable when the gains of all outputs change by factors between {:.2} and {highest}, or their \
-         phases by up to {:.0} degrees.",
-        robustness.peak_sensitivity?, disk.lowest_gain?, disk.phase_deg?
-    );
-    let status = match zone {
-        IsoZone::A | IsoZone::B => Status::Good,
-        IsoZone::C => Status::Caution,
-        IsoZone::D => Status::Bad,
-    };
-    Some(Verdict { status, text, evidence: ReportPart::Margins })
+    deviation_line(found).into_iter().chain(of_loop).chain(lines.into_iter().flatten()).collect()
 }
 
 /// The fit of the physical structure against that of G(S).

@@ -10,7 +10,9 @@ pub(crate) mod redesign;
 pub(crate) mod verdict;
 
 mod certificate;
+mod fit;
 mod frequency;
+mod loops;
 mod nonparametric;
 mod records;
 mod reduction;
@@ -68,7 +70,7 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         physical: structure.map(|of| of.estimate.clone()),
         reduction: found.reduced().map(reduction::drawn),
         certificates: all().map(|(key, model)| models::certificate(key, model)).collect(),
-        loop_tables: found.certified().map_or_else(Vec::new, certificate::tables),
+        loop_tables: found.certified().map_or_else(Vec::new, |of| certificate::tables(of, found.records.time.ts())),
         recommended: recommended::tables(found),
         redesign: match found.new_pid() {
             Some(new) => Some(pid::drawn(new)),

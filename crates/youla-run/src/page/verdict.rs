@@ -1,7 +1,8 @@
 //! The answer to "Can it be trusted?": the recommended model with its evidence, fit and residuals on fresh data, data and controller,
 //! the loop.
 
-use super::nonparametric;
+use super::{fit, loops, nonparametric};
+use crate::Error;
 use crate::check::OF_SETTINGS;
 use crate::method::Method;
 use crate::result::Identification;
@@ -14,10 +15,11 @@ use youla_report::numbers;
 
 /// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
-    let rest = [unnoticed_line(found), fit_line(found, summary), residual_line(found, summary)];
+    let rest = [unnoticed_line(found), fit::line(found, summary), residual_line(found, summary)];
     let last = [data_line(found), loop_line(found, summary)];
     let of_model = recommended_lines(found).into_iter().chain(nonparametric::verdict_lines(found));
-    of_model.chain(rest.into_iter().chain(last).flatten()).collect()
+    let of_loop = loops::lines(found, summary).into_iter().filter(loops::warns);
+    of_model.chain(rest.into_iter().chain(last).flatten()).chain(of_loop).collect()
 }
 
 /// The line on the recommended model, then one line for each question that its evidence fails.
@@ -25,7 +27,7 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
     let line = |status, text: String| Verdict { status, text, evidence: ReportPart::Recommended };
     let model = match &found.recommended {
         Ok(model) => model,
-        Err(reason) => return vec![line(Status::Bad, format!("No model is recommended: {reason}."))],
+        Err(reason) => return vec![line(Status::Bad, no_model(found, reason))],
     };
     let dead_time = match &model.dead_time[..] {
         delays if delays.iter().all(|d| *d == 0) => String::new(),
@@ -45,15 +47,34 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
     std::iter::once(first).chain(failed).chain(named).collect()
 }
 
+/// Why no model is recommended, and what would give one.
+fn no_model(found: &Identification, reason: &Error) -> String {
+    let Some(root @ youla::Error::ConstantChannel { what, value }) = reason.root() else {
+        return format!("No model is recommended: {reason}.");
+    };
+    let named =
+        what.strip_prefix("input ").and_then(|n| found.records.inputs.get(n.parse::<usize>().ok()?.checked_sub(1)?));
+    match named {
+        Some(channel) => format!(
+            "No model is recommended: the input {:?} is {value} in every record, so its effect cannot be told from the offset of the outputs. \
+             Take it out of `inputs` in [data] where no physical structure needs it, or record an experiment in which it changes.",
+            channel.name
+        ),
+        None => format!(
+            "No model is recommended: {root}. Check that the column is the right one, and record an experiment in which it changes."
+        ),
+    }
+}
+
 /// The model that the lines are about: the recommended one, else the first that was identified.
-fn subject<'a>(found: &Identification, summary: &'a Summary) -> Option<(Method, &'a ModelEntry)> {
+pub(super) fn subject<'a>(found: &Identification, summary: &'a Summary) -> Option<(Method, &'a ModelEntry)> {
     let given = [Method::Nominal, Method::TruePlant];
     let method = found.validation.models.iter().map(|v| v.method).find(|method| !given.contains(method))?;
     Some((method, summary.model(method)?))
 }
 
 /// The name of a model in a sentence.
-fn name(method: Method) -> &'static str {
+pub(super) fn name(method: Method) -> &'static str {
     match method {
         Method::Likelihood => "the recommended model",
         Method::Hansen => "G(S)",
@@ -63,36 +84,6 @@ fn name(method: Method) -> &'static str {
         Method::Nominal => "the nominal model",
         Method::TruePlant => "the true plant",
     }
-}
-
-/// Residual of the model over that of the nominal model, from which the fit is called worse: two good models differ by chance.
-/// 5 %. Chosen, not measured.
-const WORSE: f64 = 1.05;
-
-fn fit_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
-    if found.records.verification.is_empty() {
-        let text = "No verification record was given, so the fit on fresh data is unknown.".into();
-        return Some(Verdict { status: Status::Caution, text, evidence: ReportPart::Fits });
-    }
-    let percent =
-        |fit: f64| if fit.is_finite() { format!("{} %", numbers::fit(fit, 1)) } else { "no prediction".into() };
-    let of = |method: Method| summary.model(method)?.mean_fit();
-    let (method, model) = subject(found, summary)?;
-    let (fit, nominal) = (model.mean_fit()?, of(Method::Nominal));
-    let mut text = format!("On fresh data {} has a mean fit of {}", name(method), percent(fit));
-    for other in [Method::Nominal, Method::Hansen, Method::Direct] {
-        if let Some(fit) = of(other).filter(|_| other != method) {
-            text += &format!(", {} {}", name(other), percent(fit));
-        }
-    }
-    text.push('.');
-    let taken = |e: &Evidence| e.question.contains("(lines)");
-    if found.recommended.as_ref().is_ok_and(|model| model.evidence.iter().any(taken)) {
-        text += " The measured outputs hold the lines that no model here predicts.";
-    }
-    // A fit says how much of the output is not noise; a high one is no evidence of a right model.
-    let worse = !fit.is_finite() || nominal.is_some_and(|nominal| 100.0 - fit > WORSE * (100.0 - nominal));
-    Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: ReportPart::Fits })
 }
 
 /// Without a known excitation: which errors the run has no means to notice.
@@ -162,17 +153,37 @@ fn data_line(found: &Identification) -> Option<Verdict> {
         return None;
     }
     let (controller, of_controller) = controller_sentence(found);
-    let of_data = |f: &Finding, severity: Severity| f.severity == severity && f.record != OF_SETTINGS;
-    let count = |severity: Severity| found.data.grouped().iter().filter(|(f, _)| of_data(f, severity)).count();
-    let (defects, cautions) = (count(Severity::Defect), count(Severity::Caution));
-    let (checked, of_check) = match (defects, cautions) {
-        (0, 0) => ("No data problems found".to_owned(), Status::Good),
-        (0, n) => (format!("{n} data warning{}", if n == 1 { "" } else { "s" }), Status::Caution),
-        (n, _) => (format!("{n} data defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
+    let count = |severity: Severity, of_settings: bool| {
+        let counted = |f: &Finding| f.severity == severity && (f.record == OF_SETTINGS) == of_settings;
+        found.data.grouped().iter().filter(|(f, _)| counted(f)).count()
     };
+    let (defects, warnings) = (count(Severity::Defect, false), count(Severity::Caution, false));
+    let of_check = match (defects, warnings) {
+        (0, 0) => Status::Good,
+        (0, _) => Status::Caution,
+        _ => Status::Bad,
+    };
+    let checked = counts([
+        (defects, "data defect"),
+        (warnings, "data warning"),
+        (count(Severity::Caution, true), "warning about the settings"),
+    ]);
     let text = format!("{controller} {checked}.");
     let evidence = if of_controller > of_check { ReportPart::Signals } else { ReportPart::Data };
     Some(Verdict { status: of_controller.max(of_check), text, evidence })
+}
+
+/// Findings of each kind as they are listed.
+fn counts(kinds: [(usize, &str); 3]) -> String {
+    let [(defects, _), (warnings, _), _] = kinds;
+    let none = (defects + warnings == 0).then(|| "No data problems found".to_owned());
+    let plural = |name: &str| match name.split_once(' ') {
+        Some(("warning", rest)) => format!("warnings {rest}"),
+        _ => format!("{name}s"),
+    };
+    let some = kinds.into_iter().filter(|(n, _)| *n > 0);
+    let words = some.map(|(n, name)| if n == 1 { format!("1 {name}") } else { format!("{n} {}", plural(name)) });
+    none.into_iter().chain(words).collect::<Vec<_>>().join(", ")
 }
 
 /// What the check of the data says of the declared controller.
@@ -210,17 +221,28 @@ fn of_alpha(found: &Identification) -> (String, Status) {
     }
 }
 
+/// Distance of a pole from the unit circle that rounding may make: half of the digits of double precision, of a double pole.
+const ROUNDING: f64 = 1e-8;
+
 /// Whether the controller stabilises the model.
 fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     let (method, model) = subject(found, summary)?;
-    let (name, worst) = (name(method), model.worst_closed_loop_pole().map_or(0.0, |[re, im]| re.hypot(im)));
+    let (name, size) = (name(method), model.worst_closed_loop_pole().map_or(0.0, |[re, im]| re.hypot(im)));
     let (status, verb, adjective) = match model.stabilised_by_controller {
+        true if 1.0 - size < ROUNDING => (Status::Caution, "stabilises", "stable"),
         true => (Status::Good, "stabilises", "stable"),
         false => (Status::Bad, "does not stabilise", "unstable"),
     };
+    let worst = numbers::radius(size);
+    let near = match status {
+        Status::Caution => ", which rounding does not tell from 1: the loop may have a mode that does not decay",
+        _ => "",
+    };
     let text = match found.declared.controller().is_zero() {
-        true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst:.5}."),
-        false => format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst:.5}."),
+        true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst}{near}."),
+        false => {
+            format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst}{near}.")
+        }
     };
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

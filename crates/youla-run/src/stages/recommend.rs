@@ -43,12 +43,16 @@ fn with_errors(records: &[LoopRecord], options: &CheckOptions) -> Result<Vec<Loo
 }
 
 /// What the model makes of findings: without wrong samples it was estimated; defects that the verdict has weighed and found harmless are cautions, as a
-/// run lists no defect beside a trusted model.
+/// run lists no defect beside a trusted model, and a caution on the controller says that its test is passed.
 pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
     for finding in data.findings.iter_mut().filter(|f| is_of_outliers(f)) {
         finding.what += "; the recommended model is estimated without them";
     }
-    let weighed = |f: &&mut Finding| f.severity == Severity::Defect && OWN.contains(&f.test);
+    let weighed = |f: &&mut Finding| match f.severity {
+        Severity::Defect => OWN.contains(&f.test),
+        Severity::Caution => f.test == Test::Controller,
+        Severity::Note => false,
+    };
     for finding in data.findings.iter_mut().filter(weighed).filter(|_| model.trusted()) {
         finding.severity = Severity::Caution;
         finding.what += " (the tests of the recommended model find it harmless in this loop)";

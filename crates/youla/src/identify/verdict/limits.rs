@@ -15,6 +15,9 @@ pub(crate) const LEAST_EXPLAINED: f64 = 5.0;
 /// strong direction one per cent leaks into the weak one, 3 times that error. References through an inverse of a distillation column, whose
 /// gains have the quotient 140, move its weak direction by 0.007 of the strong one, far above the noise.
 pub(crate) const LEAST_DIRECTION: f64 = 0.003;
+/// The same from which the errors of several records are compared, whose noise must be exceeded in every direction then: a machine that varies
+/// has errors along the strong direction, and what leaks of them into a weak one varies too. One per cent of leakage is 30 % of them.
+pub(crate) const LEAST_COMPARED: f64 = 0.03;
 /// Least power that the excitation moves along a direction of the inputs, over that of the noise there: the quotient of two sums is biased
 /// towards the inverse of the controller by its inverse, 3 %.
 pub(crate) const LEAST_MOVED: f64 = 30.0;

@@ -11,7 +11,8 @@
 
 use super::excess::{Excess, ExcessBand};
 use super::limits::{
-    BAND_LINES, HANN_LOSS, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION,
+    BAND_LINES, HANN_LOSS, LEAST_COMPARED, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE,
+    WEAK_EXCITATION,
 };
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
@@ -56,6 +57,8 @@ pub(crate) struct Band {
     pub(crate) error: Vec<c64>,
     /// Variance of each entry.
     pub(crate) variance: Vec<f64>,
+    /// Whether every direction of the inputs is moved enough for its error to be compared with that of another record.
+    pub(crate) compares: bool,
     /// Of the first band: frequencies, shares of the sample rate, with their portions of the power of the inputs.
     pub(crate) power: Vec<(f64, f64)>,
 }
@@ -89,7 +92,13 @@ impl LocalErrors {
             }
             let whole = found.filter(|f| f.degrees == (2 * channels.m * channels.p) as f64);
             let share = 0.5 * (k as f64 + 0.5) / count as f64;
-            let band = |f: BandError| Band { share, error: f.error, variance: f.variance, power: sums.power() };
+            let band = |f: BandError| Band {
+                share,
+                error: f.error,
+                variance: f.variance,
+                compares: f.compares,
+                power: sums.power(),
+            };
             bands.push(whole.map(band));
         }
         let significance = (degrees > 0.0).then(|| chi_square_deviations(statistic, degrees));
@@ -111,7 +120,7 @@ impl LocalErrors {
     pub(crate) fn scatter(groups: &[LocalErrors]) -> Excess {
         let count = groups.iter().map(|g| g.bands.len()).min().unwrap_or(0);
         let bands = (0..count).filter_map(|k| {
-            let all: Vec<&Band> = groups.iter().filter_map(|g| g.bands[k].as_ref()).collect();
+            let all: Vec<&Band> = groups.iter().filter_map(|g| g.bands[k].as_ref().filter(|b| b.compares)).collect();
             let entries = all.first().filter(|_| all.len() > 1)?.error.len();
             let (squares, chance) = (0..entries).map(|i| scatter_of(&all, i)).unzip();
             let (share, power) = (all[0].share, all[0].power.clone());
@@ -122,9 +131,10 @@ impl LocalErrors {
 
     /// Squares of the difference of the errors of two records beyond their variances: of the model of one and another record, twice the
     /// scatter between records.
-    pub(crate) fn difference([one, other]: [&LocalErrors; 2]) -> Excess {
-        let of = |(a, b): (&Option<Band>, &Option<Band>)| {
-            let (a, b) = (a.as_ref()?, b.as_ref()?);
+    pub(crate) fn difference<'a>([one, other]: [&'a LocalErrors; 2]) -> Excess {
+        let of = |(a, b): (&'a Option<Band>, &'a Option<Band>)| {
+            let compared = |of: &'a Option<Band>| of.as_ref().filter(|band| band.compares);
+            let (a, b) = (compared(a)?, compared(b)?);
             let chance: Vec<f64> = a.variance.iter().zip(&b.variance).map(|(a, b)| a + b).collect();
             let apart = a.error.iter().zip(&b.error).map(|(a, b)| (a - b).norm_sqr());
             let squares = apart.zip(&chance).map(|(square, chance)| square - chance).collect();
@@ -271,6 +281,7 @@ struct BandError {
     degrees: f64,
     error: Vec<c64>,
     variance: Vec<f64>,
+    compares: bool,
 }
 
 fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<BandError> {
@@ -313,7 +324,10 @@ fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<
     }
     // Mean of the square of Student's variable with `2 free` degrees of freedom.
     statistic *= ((free - 1.0) / free).max(0.5);
-    (rank > 0).then_some(BandError { statistic, degrees, error, variance })
+    let last = rank.checked_sub(1)?;
+    let noise: f64 = (0..m).map(|j| svd.U()[(j, last)].norm_sqr() * of_inputs[(j, j)].re.max(0.0) / free).sum();
+    let compares = sizes[last] > LEAST_COMPARED * sizes[0] && sizes[last] * sizes[last] > LEAST_MOVED * noise;
+    Some(BandError { statistic, degrees, error, variance, compares })
 }
 
 #[cfg(test)]

@@ -85,7 +85,7 @@ impl Recommendation {
         self.evidence.iter().find(asked).map(Evidence::holds)
     }
 
-    /// Whether a failed test is about the model, so that its own region is no evidence; the tests [`OF_LOOP`] are about the loop.
+    /// Whether a failed test is about the model, so that its own region is no evidence; those of region and controller are about the loop.
     pub fn in_doubt(&self) -> bool {
         let of_loop = |e: &Evidence| OF_LOOP.iter().any(|name| e.question.ends_with(name));
         self.evidence.iter().any(|e| !e.holds() && !of_loop(e))

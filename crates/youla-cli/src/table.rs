@@ -3,6 +3,8 @@
 use crate::terminal;
 use std::fmt::Write;
 use youla::error::short;
+use youla::identify::likelihood::figure;
+use youla_loop::redesign::structured::PidController;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
 use youla_report::numbers::fit;
@@ -17,6 +19,9 @@ pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     }
     text.push('\n');
     text += &fitted(&rows(found), terminal::width().unwrap_or(usize::MAX));
+    if let Some(new) = &written.summary.pid {
+        text += &new_gains(&new.controllers, &written.folder.display().to_string());
+    }
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
@@ -26,6 +31,18 @@ pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     let folder = &written.folder;
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
     text
+}
+
+/// The gains of a new PID, or of one for each loop, and the command that writes them for the machine.
+fn new_gains(controllers: &[PidController], folder: &str) -> String {
+    let mut text = String::new();
+    for (k, PidController { gains, notches, .. }) in controllers.iter().enumerate() {
+        let of_loop = if controllers.len() > 1 { format!(" of loop {}", k + 1) } else { String::new() };
+        let [kp, ki, kd, filter] = [gains.kp, gains.ki, gains.kd, gains.derivative_filter].map(figure);
+        let _ = write!(text, "\nnew PID{of_loop}: kp {kp}, ki {ki} 1/s, kd {kd} s, derivative_filter {filter} s");
+        notches.iter().for_each(|notch| text += &format!(", notch at {} Hz", figure(notch.hz)));
+    }
+    text + &format!("\n  youla export {folder} --to gains, c-pid or st writes it")
 }
 
 /// Table 1, what became of the paper's claims, and where everything is.

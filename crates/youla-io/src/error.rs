@@ -191,8 +191,8 @@ pub enum Error {
     },
     /// The steps of the time column are not uniform.
     #[error(
-        "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s; gaps = \"split\" in [data] cuts the record there, `segments` of the file choose rows",
-        Seconds(*dt), Seconds(*ts)
+        "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s; {}",
+        Seconds(*dt), Seconds(*ts), step_remedy(*dt)
     )]
     NonUniformTime {
         /// The record or file.
@@ -298,6 +298,15 @@ fn position(at: Option<TextPosition>) -> String {
     at.map_or(String::new(), |p| format!(":{}:{}", p.line, p.column))
 }
 
+/// What to do about a step of the time column.
+fn step_remedy(dt: f64) -> &'static str {
+    if dt > 0.0 {
+        "gaps = \"split\" in [data] cuts the record there, `segments` of the file choose rows"
+    } else {
+        "remove the rows that were logged twice, and sort the others"
+    }
+}
+
 /// The setting that makes a cell with the other decimal sign a number.
 fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     let missing = ["", "nan", "na", "null", "none", "-"].contains(&text.trim().to_ascii_lowercase().as_str());
@@ -312,7 +321,9 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     match decimal {
         Some(sign) => remedy(sign),
         None if text.chars().any(char::is_alphabetic) => {
-            "; a line of units or notes is passed over where skip_lines in [data] csv (--skip-lines) names it".into()
+            "; a line of units or notes is passed over where skip_lines in [data] csv (--skip-lines) names it; a row of a fault is left out \
+             of the file, and gaps = \"split\" in [data] cuts the record there"
+                .into()
         }
         None => String::new(),
     }

@@ -70,6 +70,9 @@ pub(super) fn record(form: Form, args: &RecordArgs) -> Result<(), Failure> {
 
 pub(super) fn excite(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
     let source = if args.own { Source::Own } else { Source::Prbs { order: 18, hold: args.hold } };
+    if !(args.amplitude > 0.0 && args.amplitude.is_finite()) {
+        return Err(refused(format!("--amplitude is {}, but must be positive", args.amplitude)));
+    }
     recorded(form, &args.record, Some(Request::Start { source, amplitude: args.amplitude }))
 }
 

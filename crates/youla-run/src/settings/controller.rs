@@ -111,26 +111,35 @@ pub enum ControllerSettings {
 }
 
 impl ControllerSettings {
-    /// Reads a JSON file that holds what `[controller]` of run.toml holds, `{"pid": {"feedback": "negative", ..}}`; `None` for a file
-    /// that is no such table, for example a model.
+    /// Reads a JSON file that holds what `[controller]` of run.toml holds, `{"pid": {"feedback": "negative", ..}}`; `None` for a model, and
+    /// for a file of another kind.
     ///
     /// # Errors
-    /// [`youla_io::Error::Settings`] for a table with one of the names of the forms whose keys are wrong; [`youla_io::Error::Io`].
+    /// [`youla_io::Error::Settings`] for text that is no JSON, for a table that is neither, and for one of the forms whose keys are wrong;
+    /// [`youla_io::Error::Io`].
     pub fn from_json(path: &Path) -> Result<Option<Self>> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
             return Ok(None);
         }
         let text = youla_io::read_text(path)?;
+        let problem = |problem| Err(youla_io::Error::Settings { path: path.to_owned(), at: None, problem }.into());
         let table = match serde_json::from_str::<serde_json::Value>(&text) {
             Ok(serde_json::Value::Object(table)) => table,
-            _ => return Ok(None),
+            Ok(_) => return problem("this JSON holds no table".into()),
+            Err(error) => return problem(format!("this is no JSON: {error}")),
         };
+        let known = forms::<Self>();
         match table.keys().next() {
-            Some(form) if table.len() == 1 && forms::<Self>().split(", ").any(|known| known == form) => {}
-            _ => return Ok(None),
+            Some(form) if table.len() == 1 && known.split(", ").any(|known| known == form) => {}
+            _ if table.contains_key("a") => return Ok(None),
+            _ => {
+                return problem(format!(
+                    "this is neither a model (ts, a, b, c, d) nor a form of controller by its name, such as {{\"pid\": {{\"kp\": 2.0, ..}}}}; \
+                     the forms are {known}"
+                ));
+            }
         }
         let parsed = serde_json::from_str::<Self>(&text);
-        let problem = |problem| Err(youla_io::Error::Settings { path: path.to_owned(), at: None, problem }.into());
         match parsed {
             Err(error) => problem(error.to_string()),
             Ok(controller) => controller.problem().map_or(Ok(Some(controller)), problem),

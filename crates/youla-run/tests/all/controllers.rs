@@ -133,6 +133,14 @@ fn a_controller_is_read_from_json() {
     assert_eq!(read("model.json", r#"{"ts": 1.0, "a": [], "b": [], "c": [[]], "d": [[1.0]]}"#).unwrap(), None);
     let error = read("bad.json", &pid.replace("\"ki\"", "\"kI\"")).unwrap_err().to_string();
     assert!(error.contains("bad.json") && error.contains("`kI`"), "{error}");
+    for (name, text, words) in [
+        ("flat.json", r#"{"kp": 2.0, "ki": 10.0}"#, "a form of controller by its name, such as {\"pid\""),
+        ("quotes.json", "{'pid': {}}", "this is no JSON"),
+        ("list.json", "[1.0, 2.0]", "holds no table"),
+    ] {
+        let error = read(name, text).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(words), "{error}");
+    }
 }
 
 /// What no controller is, is said with the key that mends it.

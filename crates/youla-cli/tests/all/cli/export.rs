@@ -42,6 +42,25 @@ fn a_run_is_exported_in_every_format_and_reads_back() {
     assert_eq!(original, copy, "a model of a run keeps its details and provenance");
 }
 
+/// What the run says against its model stands on the terminal and in the file.
+#[test]
+fn a_model_that_is_not_trusted_is_exported_with_a_caution() {
+    let folder = empty_folder("export-untrusted");
+    fs::create_dir_all(folder.join("run/4-identify")).expect("made");
+    for file in ["4-identify/recommended.json", "4-identify/recommended.mat"] {
+        fs::copy(demo().join(file), folder.join("run").join(file)).expect("copied");
+    }
+    let text = fs::read_to_string(demo().join("summary.json")).expect("written");
+    let mut summary: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    summary["recommended"]["trusted"] = false.into();
+    fs::write(folder.join("run/summary.json"), summary.to_string()).expect("written");
+    let found = youla(&folder, &["export", "run", "--to", "python"]);
+    done(&found);
+    assert!(found.stdout.contains("caution: the recommended model of this run is not trusted"), "{}", found.stdout);
+    let text = fs::read_to_string(folder.join("recommended.py")).expect("written");
+    assert!(text.contains("CAUTION: the recommended model of this run is not trusted"), "{text}");
+}
+
 #[test]
 fn files_are_exported_too_and_say_where_they_come_from() {
     let folder = empty_folder("export-file");

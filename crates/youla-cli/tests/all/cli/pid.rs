@@ -67,6 +67,8 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
         let done = youla(&folder, &["export", "run", "--to", form, "--out", form]);
         assert_eq!(done.code, Some(0), "{}", done.stderr);
     }
+    let said = youla(&folder, &["identify", "run.toml", "--out", "said"]).stdout;
+    assert!(said.contains("new PID: kp ") && said.contains("youla export said --to gains"), "{said}");
     let read = |form: &str| fs::read_to_string(folder.join(form)).expect("written");
     let of_c: Vec<String> = read("c-pid").lines().map(|l| l.trim().replace("s->", "")).collect();
     let of_st: Vec<String> = read("st").lines().map(|l| l.replacen(" := ", " = ", 1)).collect();

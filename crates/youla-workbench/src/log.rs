@@ -9,7 +9,7 @@ use youla_io::{CsvOptions, DecimalSign, SurveyedColumn, unit_of_time};
 /// Words of headings for each role, English and German, in the order in which they are tried; `time` needs even steps besides.
 const WORDS: [(&str, &str); 5] = [
     ("time", "t time zeit timestamp seconds sec"),
-    ("excitation", "d exc excitation dither injection injected added prbs chirp sweep noise anregung rauschen"),
+    ("excitation", "d exc excitation dither inj injection injected added prbs chirp sweep noise anregung rauschen"),
     ("reference", "r ref reference setpoint sp target desired demand soll sollwert w"),
     (
         "input",

@@ -38,10 +38,13 @@ fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         }
         _ => "",
     };
+    let of_all = match (format!("{worst:.2}"), format!("{together:.2}")) {
+        (worst, together) if worst == together => String::new(),
+        (_, together) => format!(" and {together} for all outputs together{all}"),
+    };
     let text = format!(
-        "The peak sensitivity of the loop with {name} is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {together:.2} for all \
-         outputs together{all}. The loop stays stable when the gains of all outputs change by factors between {lowest} and {highest}, or \
-         their phases by up to {} degrees.",
+        "The peak sensitivity of the loop with {name} is {worst:.2} at the worst output (zone {zone} of ISO 14839-3){of_all}. The loop stays \
+         stable when the gains of all outputs change by factors between {lowest} and {highest}, or their phases by up to {} degrees.",
         degrees(disk.phase_deg?)
     );
     Some(Verdict { status, text, evidence: ReportPart::Margins })

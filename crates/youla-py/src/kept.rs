@@ -83,11 +83,11 @@ pub(crate) fn settings_json(toml: &str) -> PyResult<String> {
 
 /// The controller that settings hold, in positive feedback, at a sample time in seconds.
 #[pyfunction]
-pub(crate) fn controller_model(py: Python<'_>, chosen: Options, ts: f64) -> PyResult<ModelOut<'_>> {
+pub(crate) fn controller_model(py: Python<'_>, chosen: Options, dt: f64) -> PyResult<ModelOut<'_>> {
     let of = || -> Result<_> {
         let settings = chosen.settings()?;
         settings.check()?;
-        Ok(settings.controller.realise(Discrete::new(ts)?, None, Path::new(""))?)
+        Ok(settings.controller.realise(Discrete::new(dt)?, None, Path::new(""))?)
     };
     Ok(model_out(py, of()?.system()))
 }

@@ -271,11 +271,11 @@ fn remove_left_over(parent: &Path, prefix: &str) -> Option<PathBuf> {
     written
 }
 
-/// Writes a text beside its final place and moves it there when whole; an older file stays until then.
-pub fn replace_file(path: &Path, text: &str) -> Result<()> {
+/// Writes a file beside its final place and moves it there when whole; an older file stays until then.
+pub fn replace_file(path: &Path, content: impl AsRef<[u8]>) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(format!(".{name}.partial-{}", process()));
-    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
+    fs::write(&partial, content).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
         // Best effort: the error that led here is the one to report.
         let _ = fs::remove_file(&partial);
         Error::Io { path: path.to_owned(), source }
@@ -320,7 +320,7 @@ pub fn add_to_list(run: &Path, files: &[PathBuf]) -> Result<()> {
             names.push(name);
         }
     }
-    replace_file(&path, &names.iter().map(|name| format!("{name}\n")).collect::<String>())
+    replace_file(&path, names.iter().map(|name| format!("{name}\n")).collect::<String>())
 }
 
 /// Writes files beside their final places and moves them there when all are whole; after an error none is changed.

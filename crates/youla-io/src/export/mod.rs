@@ -31,6 +31,7 @@ pub use read::{model_from_bytes, read_model};
 pub use sequence::{SequenceFormat, export_sequence};
 
 use crate::error::{Error, Result};
+use crate::folder::replace_file;
 use crate::matfile::mat_to_bytes;
 use crate::target::require_free;
 use crate::values::{Value, Variable};
@@ -167,13 +168,7 @@ pub fn export_model(model: &NamedModel, format: ModelFormat) -> Result<Vec<u8>> 
 /// [`Error::FileExists`], [`Error::Io`]; nothing is left behind then.
 pub fn write_export(path: &Path, bytes: &[u8], replace: bool) -> Result<()> {
     require_free(path, replace, &[])?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
-    std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|source| {
-        // Best effort: the error that led here is the one to report.
-        let _ = std::fs::remove_file(&partial);
-        Error::Io { path: path.to_owned(), source }
-    })
+    replace_file(path, bytes)
 }
 
 /// `a`, `b`, `c`, `d`, `ts` as in a run folder, `predictor_a` and so on where the model has a predictor, and the names and units of the channels as cells of text.

@@ -2,6 +2,7 @@
 
 use super::finding;
 use crate::records::RunRecords;
+use faer::ColRef;
 use youla::signal::LoopRecord;
 use youla_loop::check::{Finding, Severity, Test};
 
@@ -29,36 +30,51 @@ pub(super) fn repeated(records: &RunRecords) -> Vec<Finding> {
 /// The sample of a record, counted from 1, with which the samples of another begin that are mostly its own. Steps are compared: of the means
 /// each record lost its own.
 fn same_from(used: &LoopRecord, later: &LoopRecord) -> Option<usize> {
-    let [used, later] = [steps(used), steps(later)];
-    let sizes: Vec<f64> = later.iter().map(|column| column.iter().fold(0.0, |m: f64, v| m.max(v.abs()))).collect();
-    let rows = later.first()?.len();
+    let [used, later] = [Steps::new(used), Steps::new(later)];
+    let (rows, channels) = (later.rows(), later.columns.len());
+    let largest = |c: usize| (0..rows).fold(0.0, |m: f64, k| m.max(later.at(c, k).abs()));
+    let sizes: Vec<f64> = (0..channels).map(largest).collect();
     let same = |a: usize, b: usize| {
-        let equal = |c: usize| (used[c][a] - later[c][b]).abs() <= ROUNDING * sizes[c];
-        (0..later.len()).all(equal)
+        let equal = |c: usize| (used.at(c, a) - later.at(c, b)).abs() <= ROUNDING * sizes[c];
+        (0..channels).all(equal)
     };
-    let moves = |b: usize| (0..later.len()).any(|c| later[c][b] != 0.0);
+    let moves = |b: usize| (0..channels).any(|c| later.at(c, b) != 0.0);
     // With the sample `at` of the used record beside `anchor` of the later one.
     let shared = |at: usize, anchor: usize| {
-        let rows = (anchor.saturating_sub(at)..rows).take_while(|b| at + b - anchor < used[0].len());
+        let rows = (anchor.saturating_sub(at)..rows).take_while(|b| at + b - anchor < used.rows());
         rows.filter(|b| moves(*b) && same(at + b - anchor, *b)).count()
     };
     // Half of the record holds a quarter whole, whose largest step is the least likely to be there twice.
     let quarters = (0..4).filter_map(|k| {
         let of = k * rows / 4..(k + 1) * rows / 4;
-        of.max_by(|a, b| later[0][*a].abs().total_cmp(&later[0][*b].abs())).filter(|anchor| moves(*anchor))
+        of.max_by(|a, b| later.at(0, *a).abs().total_cmp(&later.at(0, *b).abs())).filter(|anchor| moves(*anchor))
     });
     let places = quarters.flat_map(|anchor| {
-        let alike = (0..used[0].len()).filter(move |at| same(*at, anchor)).take(MOST_PLACES);
+        let alike = (0..used.rows()).filter(move |at| same(*at, anchor)).take(MOST_PLACES);
         alike.map(move |at| (at, anchor))
     });
     let mut found = places.filter(|(at, anchor)| shared(*at, *anchor) as f64 > SHARE * rows as f64);
     found.next().map(|(at, anchor)| at.saturating_sub(anchor) + 1)
 }
 
-/// Differences of successive samples of all inputs and outputs, column by column.
-fn steps(record: &LoopRecord) -> Vec<Vec<f64>> {
-    let columns = record.u().col_iter().chain(record.y().col_iter());
-    columns.map(|c| (1..c.nrows()).map(|k| c[k] - c[k - 1]).collect()).collect()
+/// Differences of successive samples of all inputs and outputs.
+struct Steps<'a> {
+    columns: Vec<ColRef<'a, f64>>,
+}
+
+impl<'a> Steps<'a> {
+    fn new(record: &'a LoopRecord) -> Self {
+        Steps { columns: record.u().col_iter().chain(record.y().col_iter()).collect() }
+    }
+
+    fn rows(&self) -> usize {
+        self.columns.first().map_or(0, |column| column.nrows().saturating_sub(1))
+    }
+
+    fn at(&self, channel: usize, row: usize) -> f64 {
+        let column = self.columns[channel];
+        column[row + 1] - column[row]
+    }
 }
 
 #[cfg(test)]

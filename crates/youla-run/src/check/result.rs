@@ -36,7 +36,9 @@ impl DataCheck {
     pub(crate) fn grouped(&self) -> Vec<(&Finding, usize)> {
         let mut groups: Vec<Vec<&Finding>> = Vec::new();
         for finding in &self.findings {
-            let kind = |f: &Finding| (f.test, f.severity, f.channel.clone());
+            fn kind(f: &Finding) -> (Test, Severity, Option<&str>) {
+                (f.test, f.severity, f.channel.as_deref())
+            }
             let joins = |group: &&mut Vec<&Finding>| {
                 kind(group[0]) == kind(finding) && group.iter().all(|known| known.record != finding.record)
             };

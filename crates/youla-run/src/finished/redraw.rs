@@ -13,7 +13,7 @@ use youla_report::{ReportData, html};
 pub fn redraw(run: &Path) -> Result<PathBuf> {
     let report = read_report(run)?;
     let path = run.join("report.html");
-    replace_file(&path, &html(&report)?)?;
+    replace_file(&path, html(&report)?)?;
     Ok(path)
 }
 

@@ -66,10 +66,8 @@ impl ControllerSettings {
                     derivative_filter: pid.derivative_filter.clone(),
                     delay: pid.delay,
                 };
-                let (words, other) = other_rule(pid.discretisation);
-                let ruled = ParallelPid { discretisation: other, ..pid.clone() };
                 let form = "[controller.ideal_pid], ki as ti and kd as td".to_owned();
-                vec![(words, Self::Pid(ruled)), (form, Self::IdealPid(ideal))]
+                vec![self.under_other_rule(pid.discretisation), (form, Self::IdealPid(ideal))]
             }
             Self::IdealPid(pid) => {
                 let parallel = ParallelPid {
@@ -81,22 +79,14 @@ impl ControllerSettings {
                     derivative_filter: pid.derivative_filter.clone(),
                     delay: pid.delay,
                 };
-                let (words, other) = other_rule(pid.discretisation);
-                let ruled = IdealPid { discretisation: other, ..pid.clone() };
                 let form = "[controller.pid], ti as ki and td as kd".to_owned();
-                vec![(words, Self::IdealPid(ruled)), (form, Self::Pid(parallel))]
+                vec![self.under_other_rule(pid.discretisation), (form, Self::Pid(parallel))]
             }
-            Self::DifferenceEquation { feedback, numerator, denominator, delay, .. } => {
-                let [numerator, denominator] = [numerator, denominator].map(reversed);
-                let (feedback, delay, reference_numerator) = (*feedback, *delay, None);
-                let turned = Self::DifferenceEquation { feedback, numerator, denominator, delay, reference_numerator };
-                vec![("the coefficients in the opposite order, that of z^-1 ascending".to_owned(), turned)]
+            Self::DifferenceEquation { .. } => {
+                vec![("the coefficients in the opposite order, that of z^-1 ascending".to_owned(), self.turned())]
             }
-            Self::TransferFunction { hold: None, feedback, domain, numerator, denominator, delay } => {
-                let [numerator, denominator] = [numerator, denominator].map(reversed);
-                let (feedback, domain, delay, hold) = (*feedback, *domain, *delay, None);
-                let turned = Self::TransferFunction { feedback, domain, hold, numerator, denominator, delay };
-                vec![("the coefficients in the opposite order, that of z descending".to_owned(), turned)]
+            Self::TransferFunction { hold: None, .. } => {
+                vec![("the coefficients in the opposite order, that of z descending".to_owned(), self.turned())]
             }
             Self::TransferFunction { hold: Some(stated), .. } | Self::StateSpace { hold: Some(stated), .. } => {
                 let (other, name) = match stated {
@@ -112,14 +102,32 @@ impl ControllerSettings {
             _ => Vec::new(),
         }
     }
-}
 
-fn other_rule(stated: Discretisation) -> (String, Discretisation) {
-    let (other, name) = match stated {
-        Discretisation::Tustin => (Discretisation::BackwardEuler, "backward-euler"),
-        Discretisation::BackwardEuler => (Discretisation::Tustin, "tustin"),
-    };
-    (format!("discretisation = \"{name}\""), other)
+    /// The same PID under the other rule than the stated one.
+    fn under_other_rule(&self, stated: Discretisation) -> (String, ControllerSettings) {
+        let (other, name) = match stated {
+            Discretisation::Tustin => (Discretisation::BackwardEuler, "backward-euler"),
+            Discretisation::BackwardEuler => (Discretisation::Tustin, "tustin"),
+        };
+        let mut ruled = self.clone();
+        if let Self::Pid(ParallelPid { discretisation, .. }) | Self::IdealPid(IdealPid { discretisation, .. }) =
+            &mut ruled
+        {
+            *discretisation = other;
+        }
+        (format!("discretisation = \"{name}\""), ruled)
+    }
+
+    /// The same coefficients in the opposite order.
+    fn turned(&self) -> ControllerSettings {
+        let mut turned = self.clone();
+        if let Self::DifferenceEquation { numerator, denominator, .. }
+        | Self::TransferFunction { numerator, denominator, .. } = &mut turned
+        {
+            (*numerator, *denominator) = (reversed(numerator), reversed(denominator));
+        }
+        turned
+    }
 }
 
 fn reversed(polynomials: &Polynomials) -> Polynomials {

@@ -99,8 +99,7 @@ fn left_out(residuals: &[Residual], records: &[&LoopSignals<'_>]) -> String {
 pub(crate) fn explains(known: &LoopKnowledge<'_>) -> bool {
     let Some(law) = known.controller.and_then(|law| observable_part(law).ok()) else { return true };
     let all: Vec<&LoopSignals<'_>> = known.estimation.iter().collect();
-    let law = &law;
-    let (residuals, _) = residuals(law, &filter_gain(law, &all), &all);
+    let (residuals, _) = residuals(&law, &filter_gain(&law, &all), &all);
     rest(&residuals, &all) < AS_STATED
 }
 

@@ -19,7 +19,7 @@ pub(super) fn write_figures(paper: &Paper, target: &Path) -> Result<()> {
     let figures = folder(target, "figures")?;
     let methods = story_methods();
     for figure in &paper_figures(paper)? {
-        replace_file(&figures.join(format!("{}.csv", figure.key)), &figure_csv(figure, &methods))?;
+        replace_file(&figures.join(format!("{}.csv", figure.key)), figure_csv(figure, &methods))?;
         replace_file(&figures.join(format!("{}.svg", figure.key)), &svg(figure, &methods)?)?;
     }
     Ok(())
@@ -32,7 +32,7 @@ pub(super) fn write_page(paper: &Paper, target: &Path) -> Result<()> {
     let tables = folder(target, "tables")?;
     for block in story.sections.iter().flat_map(|section| &section.blocks) {
         if let Block::Table(table) = block {
-            replace_file(&tables.join(format!("{}.csv", table.key)), &table_csv(table))?;
+            replace_file(&tables.join(format!("{}.csv", table.key)), table_csv(table))?;
         }
     }
     Ok(replace_file(&target.join("report.html"), &story_html(&story)?)?)

@@ -76,7 +76,7 @@ fn block(pole: c64, residues: &Mat<f64>, m: usize, p: usize) -> Option<Block> {
     Some(Block { states: 2, a: vec![pole.re, -pole.im, pole.im, pole.re], b, c })
 }
 
-/// Whitened residuals, and inputs seen through the filters of each output; cross terms of the covariance are left out.
+/// Whitened residuals, and inputs seen through the filters of each output; cross terms of the noise are left out.
 struct Fits<'a> {
     spectra: &'a Spectra,
     whitened: Vec<Vec<c64>>,
@@ -85,16 +85,9 @@ struct Fits<'a> {
 
 impl<'a> Fits<'a> {
     fn new(spectra: &'a Spectra, residuals: &[Vec<c64>], noise: &Noise) -> Self {
-        let p = spectra.outputs;
         let (mut whitened, mut gains) = (Vec::new(), Vec::new());
         for (lines, v) in spectra.records.iter().zip(residuals) {
-            let mut gain = vec![c64::ZERO; v.len()];
-            for (k, z) in lines.z.iter().enumerate() {
-                noise.filters(*z, &mut gain[k * p..(k + 1) * p]);
-                for i in 0..p {
-                    gain[k * p + i] *= lines.weight[k] / noise.covariance[(i, i)].sqrt();
-                }
-            }
+            let gain = noise.of_each_output(lines);
             whitened.push(v.iter().zip(&gain).map(|(v, g)| v * g).collect());
             gains.push(gain);
         }

@@ -82,7 +82,8 @@ impl<'a> Places<'a> {
             model,
             chart: &chart,
             noise,
-            entering: &[],
+            entering: None,
+            ends: &[],
             coefficients: false,
             more: (&signals, m + p),
         };
@@ -238,7 +239,7 @@ fn sized(
 fn whitened(place: Place<'_>, count: usize) -> Vec<Column> {
     let (lines, p) = (place.lines.z.len(), place.model.outputs);
     let mut work = Mat::<f64>::zeros(2 * lines * p, count);
-    Rows::new(place.model, count).write(place, 0..lines, (&mut work, 0));
+    Rows::new(&place, count).write(place, 0..lines, (&mut work, 0));
     // Rows of LANES lines stand together, by outputs, real parts above imaginary parts.
     let entry = |column: usize, k: usize, i: usize| {
         let (first, within) = (k / LANES * LANES, k % LANES);

@@ -6,7 +6,7 @@
 
 use crate::identify::likelihood::recommendation::Predictor;
 use crate::identify::likelihood::search::autoregression::Regression;
-use crate::identify::likelihood::search::driven::Driven;
+use crate::identify::likelihood::search::driven::{Driven, Kalman};
 use crate::identify::likelihood::search::noise::Noise;
 use crate::linalg::{RiccatiProblem, block, block_diagonal, dare, eigenvalues};
 use crate::lti::{Discrete, StateSpace};
@@ -20,39 +20,47 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
     let [shift, enters, seen] = autoregressions(&noise.regression);
     let (n, p, extra) = (plant.order(), plant.outputs(), shift.nrows());
     // The innovations of a filter that mirrors poles are smaller than those of the noise at the inputs of an unstable plant.
-    let mirrored = |i: usize| noise.regression[i].driven.as_ref().map_or(1.0, |driven| driven.unstable);
+    let mirrored = |i: usize| noise.regression[i].driven.as_ref().map_or(1.0, |driven| driven.kalman.unstable);
     let size = |i: usize| sizes[i] * mirrored(i);
     let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * size(i) * size(j));
-    // Noise at the inputs moves the states of the plant; of several outputs each has its own, independent of the others. A colour has a state
+    // Noise at the inputs moves the states of the plant; of many outputs each has its own, independent of the others. A colour has a state
     // for each input.
-    let driven = || noise.regression.iter().enumerate().filter_map(|(i, r)| Some((i, r.driven.as_deref()?)));
-    let own = |d: &Driven| d.of_colour.len() + if p > 1 { d.gain.len() } else { 0 };
-    let copies: usize = driven().map(|(_, d)| own(d)).sum();
-    let first = n + copies;
-    let mut a = block_diagonal(block_diagonal(plant.a(), Mat::zeros(copies, copies).as_ref()).as_ref(), shift.as_ref());
-    let b = block(&[&[plant.b()], &[Mat::zeros(copies + extra, plant.inputs()).as_ref()]]);
-    let mut c = block(&[&[plant.c(), Mat::zeros(p, copies).as_ref(), seen.as_ref()]]);
+    let of_each: Vec<Option<&Driven>> =
+        noise.regression.iter().map(|r| r.driven.as_deref().filter(|_| p > 1)).collect();
+    let alone = || noise.regression.iter().filter(|_| p == 1).find_map(|r| r.driven.as_deref());
+    let shared = noise.joint.as_ref().map(|joint| &joint.kalman).or_else(|| alone().map(|driven| &driven.kalman));
+    let colours = shared.map_or(0, |kalman| kalman.of_colour.nrows());
+    let copies: usize = of_each.iter().flatten().map(|driven| driven.kalman.gain.nrows()).sum();
+    let own = colours + copies;
+    let first = n + own;
+    let mut a = block_diagonal(block_diagonal(plant.a(), Mat::zeros(own, own).as_ref()).as_ref(), shift.as_ref());
+    let b = block(&[&[plant.b()], &[Mat::zeros(own + extra, plant.inputs()).as_ref()]]);
+    let mut c = block(&[&[plant.c(), Mat::zeros(p, own).as_ref(), seen.as_ref()]]);
     let mut gain = block(&[&[Mat::zeros(first, p).as_ref()], &[enters.as_ref()]]);
+    let mut driven_by = |a: &mut Mat<f64>, s: usize, i: usize, k: f64| {
+        gain[(s, i)] = k / sizes[i];
+        (0..extra).for_each(|j| a[(s, first + j)] += k / sizes[i] * seen[(i, j)]);
+    };
+    if let Some(Kalman { entry, gain, b, of_colour, .. }) = shared {
+        for i in 0..p {
+            (0..gain.nrows()).for_each(|s| driven_by(&mut a, s, i, gain[(s, i)]));
+            (0..colours).for_each(|j| driven_by(&mut a, n + j, i, of_colour[(j, i)]));
+        }
+        for j in 0..colours {
+            a[(n + j, n + j)] = entry.colour.unwrap_or(0.0);
+            (0..b.nrows()).for_each(|s| a[(s, n + j)] = b[(s, j)]);
+        }
+    }
     let mut at = n;
-    for (i, driven) in driven() {
-        let states = driven.gain.len();
-        let of_plant = if p > 1 { at } else { 0 };
-        if p > 1 {
-            a.submatrix_mut(at, at, states, states).copy_from(&driven.a);
-            (0..states).for_each(|s| c[(i, at + s)] = driven.c[(0, s)] * sizes[i]);
-            at += states;
+    for (i, driven) in of_each.iter().enumerate() {
+        let Some(Driven { kalman, a: own, c: sees, .. }) = driven else { continue };
+        let states = own.nrows();
+        a.submatrix_mut(at, at, states, states).copy_from(own);
+        for s in 0..states {
+            c[(i, at + s)] = sees[(0, s)] * sizes[i];
+            driven_by(&mut a, at + s, i, kalman.gain[(s, 0)]);
         }
-        let mut driven_by = |s: usize, k: f64| {
-            gain[(s, i)] = k / sizes[i];
-            (0..extra).for_each(|j| a[(s, first + j)] = k / sizes[i] * seen[(i, j)]);
-        };
-        driven.gain.iter().enumerate().for_each(|(s, k)| driven_by(of_plant + s, *k));
-        driven.of_colour.iter().enumerate().for_each(|(j, k)| driven_by(at + j, *k));
-        for (j, _) in driven.of_colour.iter().enumerate() {
-            a[(at + j, at + j)] = driven.entry.colour.unwrap_or(0.0);
-            (0..states).for_each(|s| a[(of_plant + s, at + j)] = driven.b[(s, j)]);
-        }
-        at += driven.of_colour.len();
+        at += states;
     }
     // The zero matrix solves the Riccati equation; it is the stabilising solution where the zeros of the noise are inside of the unit circle
     // without it.

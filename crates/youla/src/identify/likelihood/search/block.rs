@@ -67,6 +67,11 @@ impl Block {
         Some((block, (0..ends).map(|k| sum(&|i| form.q[(i, k)] * t[i])).collect()))
     }
 
+    /// The block with responses that cost less: triangular, where A has a Schur form.
+    pub(crate) fn quickened(&self) -> Block {
+        self.triangular(&[]).map_or_else(|| self.clone(), |(block, _)| block)
+    }
+
     /// (z I - A)^-1, row by row.
     pub(crate) fn resolvent(&self, z: c64, out: &mut [c64]) {
         match self.states {
@@ -76,7 +81,11 @@ impl Block {
                 let scale = (p * q - self.a[1] * self.a[2]).inv();
                 (out[0], out[1], out[2], out[3]) = (q * scale, scale * self.a[1], scale * self.a[2], p * scale);
             }
-            s => invert(s, |i, j| if i == j { z - self.a[i * s + j] } else { c64::new(-self.a[i * s + j], 0.0) }, out),
+            s => {
+                let entry =
+                    |i: usize, j: usize| if i == j { z - self.a[i * s + j] } else { c64::new(-self.a[i * s + j], 0.0) };
+                invert(s, entry, out);
+            }
         }
     }
 
@@ -108,9 +117,10 @@ impl Block {
     }
 }
 
-/// Gauss-Jordan with partial pivoting.
-fn invert(s: usize, entry: impl Fn(usize, usize) -> c64, out: &mut [c64]) {
+/// The inverse of an s x s matrix by Gauss-Jordan with partial pivoting, and the magnitude of its determinant.
+pub(crate) fn invert(s: usize, entry: impl Fn(usize, usize) -> c64, out: &mut [c64]) -> f64 {
     let w = 2 * s;
+    let mut determinant = 1.0;
     let mut work = vec![c64::ZERO; s * w];
     for i in 0..s {
         for j in 0..s {
@@ -130,6 +140,7 @@ fn invert(s: usize, entry: impl Fn(usize, usize) -> c64, out: &mut [c64]) {
                 work.swap(pivot * w + j, col * w + j);
             }
         }
+        determinant *= work[col * w + col].norm_sqr();
         let inverse = work[col * w + col].inv();
         for j in 0..w {
             work[col * w + j] *= inverse;
@@ -149,4 +160,5 @@ fn invert(s: usize, entry: impl Fn(usize, usize) -> c64, out: &mut [c64]) {
             out[i * s + j] = work[i * w + s + j];
         }
     }
+    determinant.sqrt()
 }

@@ -73,7 +73,8 @@ fn part(
             // Lambda^-1 e
             let behind: c64 = (*i..p).map(|j| white[j] * noise.root[(j, *i)]).sum();
             let excess = lines.share[k] - lines.weight[k].powi(2) * (behind.conj() * e[*i]).re;
-            let shape = excess * every as f64 * driven.entry.ratio / (1.0 + driven.entry.ratio * values[place * p + i]);
+            let ratio = driven.kalman.entry.ratio();
+            let shape = excess * every as f64 * ratio / (1.0 + ratio * values[place * p + i]);
             let response = plant.response(lines.z[k]);
             let moved = sum.iter_mut().enumerate().filter(|(q, _)| moves[*q]);
             moved.for_each(|(q, sum)| {

@@ -9,10 +9,9 @@
 
 use super::chart::Chart;
 use super::driven::entering::Entering;
-use super::driven::longest;
-use super::model::Model;
 use super::noise::Noise;
 use super::point::Point;
+use super::residual::residual;
 use super::rows::{Place, Rows};
 use crate::identify::likelihood::data::lanes::LANES;
 use crate::identify::likelihood::data::spectra::{Spectra, parts};
@@ -87,18 +86,23 @@ pub(crate) fn linearise_with(
     let mut factor = Mat::<f64>::zeros(0, width);
     let mut ends = Vec::with_capacity(spectra.records.len());
     let entering = match extra.filter {
-        Filter::Held => Vec::new(),
-        Filter::Moves | Filter::Free => entering(spectra, &point.model, chart, noise),
+        Filter::Held => None,
+        Filter::Moves | Filter::Free => Entering::new(spectra, &point.model, chart, noise),
     };
     for (k, (lines, t)) in spectra.records.iter().zip(&point.ends).enumerate() {
         let values = extra.values.get(k).map_or(&[][..], Vec::as_slice);
+        // Slopes are those beside what the ends of colours drive.
+        let joint = noise.joint.as_ref().filter(|joint| entering.is_some() && joint.ends() > 0);
+        let ends_of_colours =
+            joint.map_or(Vec::new(), |joint| joint.rest_and_ends(lines, &residual(&point.model, lines, t)).1);
         let place = Place {
             lines,
             t,
             model: &point.model,
             chart,
             noise,
-            entering: &entering,
+            entering: entering.as_ref(),
+            ends: &ends_of_colours,
             coefficients,
             more: (values, extra.count),
         };
@@ -109,15 +113,6 @@ pub(crate) fn linearise_with(
         factor = if factor.nrows() == 0 { rest.to_owned() } else { compressed(&stacked(&factor, &rest.to_owned())) };
     }
     Linearised { factor: without(factor, chart.parameters()..chart.parameters() + of_noise), ends }
-}
-
-/// Noise at the inputs of each output, in the coordinates of a model; `None` where none enters.
-fn entering(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> Vec<Option<Entering>> {
-    let of = |output: usize| {
-        let entry = noise.regression[output].driven.as_ref()?.entry;
-        Entering::new((model, longest(spectra)), chart, (output, entry))
-    };
-    (0..model.outputs).map(of).collect()
 }
 
 /// Coefficients of the noise of all outputs that have columns at most: the work grows with the square of their number.
@@ -149,18 +144,19 @@ pub(crate) fn compressed(rows: &Mat<f64>) -> Mat<f64> {
 
 /// `[t parameters residual]` of one record in triangular form.
 fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
-    let count = place.lines.z.len();
+    let (count, last) = (place.lines.z.len(), columns(&place) - 1);
+    let own = last - place.ends_of_colours()..last;
     if !quick {
-        return orthogonal(place, count);
+        return without(orthogonal(place, count), own);
     }
     let grams: Vec<Mat<f64>> = parts(count).map(|range| gram(place, range)).collect();
     let columns = columns(&place);
-    root_of(&grams.iter().fold(Mat::zeros(columns, columns), |sum, gram| sum + gram))
+    without(root_of(&grams.iter().fold(Mat::zeros(columns, columns), |sum, gram| sum + gram)), own)
 }
 
 fn columns(place: &Place<'_>) -> usize {
     let of_noise = if place.coefficients { place.noise.parameters() } else { 0 };
-    place.model.end_count() + place.chart.parameters() + of_noise + place.more.1 + 1
+    place.model.end_count() + place.chart.parameters() + of_noise + place.more.1 + place.ends_of_colours() + 1
 }
 
 /// Lines whose rows are brought to triangular form together.
@@ -172,7 +168,7 @@ fn chunk(place: &Place<'_>) -> usize {
 /// The normal equations of a part of the lines, lower triangle.
 fn gram(place: Place<'_>, range: Range<usize>) -> Mat<f64> {
     let (columns, chunk) = (columns(&place), chunk(&place));
-    let mut rows = Rows::new(place.model, columns);
+    let mut rows = Rows::new(&place, columns);
     let mut work = Mat::<f64>::zeros(2 * place.model.outputs * chunk, columns);
     let mut gram = Mat::<f64>::zeros(columns, columns);
     let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
@@ -187,7 +183,7 @@ fn gram(place: Place<'_>, range: Range<usize>) -> Mat<f64> {
 /// By orthogonal triangles, one chunk of lines after the other.
 fn orthogonal(place: Place<'_>, count: usize) -> Mat<f64> {
     let (columns, chunk) = (columns(&place), chunk(&place));
-    let mut rows = Rows::new(place.model, columns);
+    let mut rows = Rows::new(&place, columns);
     let mut work = Mat::<f64>::zeros(columns + 2 * place.model.outputs * chunk, columns);
     let mut held = 0;
     for first in (0..count).step_by(chunk) {

@@ -31,9 +31,10 @@ impl Point {
 /// Sum of squares of the whitened residuals.
 pub(crate) fn energy(spectra: &Spectra, residuals: &[Vec<c64>], noise: &Noise) -> f64 {
     let p = spectra.outputs;
+    let rest = noise.joint.as_ref().map(|joint| joint.rest(spectra, residuals));
     let mut filters = vec![c64::ZERO; p];
     let mut sum = 0.0;
-    for (lines, v) in spectra.records.iter().zip(residuals) {
+    for (lines, v) in spectra.records.iter().zip(rest.as_deref().unwrap_or(residuals)) {
         for (k, z) in lines.z.iter().enumerate() {
             noise.filters(*z, &mut filters);
             let twice = lines.weight[k] * lines.weight[k];

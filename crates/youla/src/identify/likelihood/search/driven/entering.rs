@@ -4,82 +4,83 @@
 //! ```text
 //! dG u + dH epsilon,      H = 1 + C M K,      M = (z I - A)^-1
 //! ```
-//! before the autoregression: of the output of a Kalman filter, `X = M (B (u + w) + z t + K epsilon)` with w the estimated noise at the inputs
+//! before the autoregression: of the output of a Kalman filter of all outputs, `X = M (B (u + w) + z t + K epsilon)` with w the estimated noise at the inputs
 //! where it has a colour, `w = K_w epsilon / (z - c)`, and `C M dK epsilon`. In a loop that holds the output, u is at low frequencies minus
 //! the noise at the input. With the filter held, the squares would be least for a plant without gain there, and the information on its gain many
 //! times too large.
 //!
 //! K is that of the Riccati equation, and its slopes solve one Stein equation for each parameter: with `F = A - K C` of plant and colour, P the
-//! covariance of their states and S that of the innovation, K being optimal,
+//! covariance of their states, Q and R the variances at the inputs and of the sensors, S that of the innovation, K being optimal,
 //! ```text
-//! dP = F dP F' + (dA - K dC) P F' + F P (dA - K dC)' + d(lambda B B')
-//! dK = ((dA - K dC) P C' + F (dP C' + P dC')) / S
+//! dP = F dP F' + (dA - K dC) P F' + F P (dA - K dC)' + d(B Q B') + K dR K'
+//! dK = ((dA - K dC) P C' + F (dP C' + P dC') - K dR) S^-1
 //! ```
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.2 and 10.3, in the form of a filter that depends on the plant.
 
 use super::gains::hidden;
-use super::{Driven, Entry, System};
+use super::kalman::{System, diagonal};
+use super::{Driven, Kalman, longest};
 use crate::identify::likelihood::data::lanes::Lanes;
+use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
 use crate::linalg::{RealSchur, discrete_lyapunov_on, real_schur};
 use faer::Mat;
 
-/// Noise at the inputs in one output.
+/// Noise at the inputs as all outputs see it.
 pub(crate) struct Entering {
-    /// The filter `1 / H` and the gain K.
-    driven: Driven,
-    /// Whether the output sees a state.
+    /// The gain K.
+    kalman: Kalman,
+    /// The filter `1 / H` of a single output.
+    alone: Option<Driven>,
+    /// Whether an output sees a state.
     seen: Vec<bool>,
-    /// dK of the states of the plant, then of the colours, by parameters.
-    slopes: Mat<f64>,
-    /// The same along lambda and along the pole of the colour.
-    by_entry: Mat<f64>,
+    /// dK of the states of the plant, then of the colours, by parameters, for each output.
+    slopes: Vec<Mat<f64>>,
+    /// The same along each free variance and along the pole of the colour.
+    by_entry: Vec<Mat<f64>>,
 }
 
-/// What moves: A, B and C of one output.
+/// What moves: A, B and C, the variances at the inputs and those of the sensors.
 struct Change {
     a: Mat<f64>,
     b: Mat<f64>,
     c: Mat<f64>,
+    inputs: Vec<f64>,
+    sensors: Vec<f64>,
 }
 
 /// The filter of Kalman, from which the slopes of its gain follow.
-struct Filter {
+struct Filter<'a> {
     system: System,
-    ratio: f64,
+    kalman: &'a Kalman,
     gain: Mat<f64>,
     /// `A - K C`, and its Schur form.
     closed: Mat<f64>,
     schur: RealSchur,
-    covariance: Mat<f64>,
-    /// Of the innovation.
-    size: f64,
+    /// Inverse of S.
+    precision: Mat<f64>,
 }
 
-impl Filter {
-    fn new(system: System, gain: Mat<f64>, covariance: Mat<f64>, ratio: f64) -> Option<Self> {
+impl<'a> Filter<'a> {
+    fn new(system: System, kalman: &'a Kalman, gain: Mat<f64>) -> Option<Self> {
         let closed = &system.a - &gain * &system.c;
         let schur = real_schur("the noise", closed.as_ref()).ok()?;
-        let size = (&system.c * &covariance * system.c.transpose())[(0, 0)] + 1.0;
-        Some(Filter { system, ratio, gain, closed, schur, covariance, size })
+        Some(Filter { system, kalman, gain, closed, schur, precision: kalman.precision() })
     }
 
     fn unchanged(&self) -> Change {
         let of = |m: &Mat<f64>| Mat::zeros(m.nrows(), m.ncols());
-        Change { a: of(&self.system.a), b: of(&self.system.b), c: of(&self.system.c) }
+        let none = |v: &[f64]| vec![0.0; v.len()];
+        let (System { a, b, c }, entry) = (&self.system, &self.kalman.entry);
+        Change { a: of(a), b: of(b), c: of(c), inputs: none(&entry.inputs), sensors: none(&entry.sensors) }
     }
 
     /// What moves with the entries of a block, whose states begin at `at` of the filter. Colours, whose states begin at the given place, drive the
     /// plant through its B, white noise drives it by itself.
-    fn along(
-        &self,
-        (block, at): (&Block, usize),
-        output: usize,
-        colours: Option<usize>,
-        moved: impl Fn(usize) -> f64,
-    ) -> Change {
+    fn along(&self, (block, at): (&Block, usize), colours: Option<usize>, moved: impl Fn(usize) -> f64) -> Change {
         let (s, m) = (block.states, block.b.len() / block.states);
         let mut change = self.unchanged();
         for i in 0..s {
@@ -90,108 +91,136 @@ impl Filter {
                     None => change.b[(at + i, j)] = moved(s * s + i * m + j),
                 }
             }
-            change.c[(0, at + i)] = moved(s * (s + m) + output * s + i);
+            (0..change.c.nrows()).for_each(|o| change.c[(o, at + i)] = moved(s * (s + m) + o * s + i));
         }
         change
     }
 
-    /// dK along a change and along a change of lambda.
-    fn slope(&self, change: &Change, of_ratio: f64) -> Option<Mat<f64>> {
-        let (p, closed, c) = (&self.covariance, &self.closed, &self.system.c);
+    /// dK along a change.
+    fn slope(&self, change: &Change) -> Option<Mat<f64>> {
+        let (System { b, c, .. }, closed, p) = (&self.system, &self.closed, &self.kalman.covariance);
+        let at_inputs = &self.kalman.entry.inputs;
         let closed_change = &change.a - &self.gain * &change.c;
-        let half = &closed_change * p * closed.transpose()
-            + (self.ratio * &change.b + 0.5 * of_ratio * &self.system.b) * self.system.b.transpose();
-        let dp = discrete_lyapunov_on(&self.schur, (&half + half.transpose()).as_ref()).ok()?;
-        let dk = closed_change * p * c.transpose() + closed * (dp * c.transpose() + p * change.c.transpose());
-        Some(dk * faer::Scale(1.0 / self.size))
+        let drive = |i: usize, j: usize| at_inputs[j] * change.b[(i, j)] + 0.5 * change.inputs[j] * b[(i, j)];
+        let half = &closed_change * p * closed.transpose() + Mat::from_fn(b.nrows(), b.ncols(), drive) * b.transpose();
+        let mut both = &half + half.transpose();
+        let sensors = &self.gain * diagonal(&change.sensors);
+        let of_sensors = change.sensors.iter().any(|v| *v != 0.0);
+        if of_sensors {
+            both += &sensors * self.gain.transpose();
+        }
+        let dp = discrete_lyapunov_on(&self.schur, both.as_ref()).ok()?;
+        let mut dk = closed_change * p * c.transpose() + closed * (dp * c.transpose() + p * change.c.transpose());
+        if of_sensors {
+            dk -= sensors;
+        }
+        Some(dk * &self.precision)
     }
 }
 
 impl Entering {
-    /// In the coordinates of a model; `longest` is the number of samples of the longest record.
-    pub(crate) fn new((model, longest): (&Model, f64), chart: &Chart, (output, entry): (usize, Entry)) -> Option<Self> {
-        let hidden = hidden(model, longest, output);
-        let driven = Driven::of_entry(model, &hidden, (output, entry))?;
-        let (m, n) = (model.inputs, model.order());
+    /// Of the noise of records, in the coordinates of a model; `None` where none enters.
+    pub(crate) fn new(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> Option<Self> {
+        let hidden = hidden(model, longest(spectra), 0..model.outputs);
+        let entry = noise.entry()?.clone();
+        let (alone, kalman) = match model.outputs {
+            1 => {
+                let driven = Driven::of_entry(model, &hidden, (0, entry))?;
+                let kalman = driven.kalman.clone();
+                (Some(driven), kalman)
+            }
+            p => (None, Kalman::new(model, &hidden, (0..p, entry))?.0),
+        };
+        let (m, n, p) = (model.inputs, model.order(), model.outputs);
         let of_block = |k: usize| std::iter::repeat_n(!hidden.contains(&k), model.blocks[k].states);
         let seen: Vec<bool> = (0..model.blocks.len()).flat_map(of_block).collect();
         // Of the states of the filter their places among those of the plant, behind which are those of the colours.
         let mut places: Vec<usize> = (0..n).filter(|i| seen[*i]).collect();
         let of_plant = places.len();
-        places.extend((0..driven.of_colour.len()).map(|j| n + j));
-        let known = |i: usize| if i < n { driven.gain[i] } else { driven.of_colour[i - n] };
-        let gain = Mat::from_fn(places.len(), 1, |i, _| known(places[i]));
-        let system = System::new(&model.without(&hidden), output, entry.colour);
-        let filter = Filter::new(system, gain, driven.covariance.clone(), entry.ratio)?;
-        let mut slopes = Mat::<f64>::zeros(n + m, chart.parameters());
-        let put = |to: &mut Mat<f64>, column: usize, change: &Change, of_ratio: f64| {
-            let dk = filter.slope(change, of_ratio)?;
-            places.iter().enumerate().for_each(|(i, place)| to[(*place, column)] = dk[(i, 0)]);
+        places.extend((0..kalman.of_colour.nrows()).map(|j| n + j));
+        let known = |i: usize, o: usize| if i < n { kalman.gain[(i, o)] } else { kalman.of_colour[(i - n, o)] };
+        let gain = Mat::from_fn(places.len(), p, |i, o| known(places[i], o));
+        let system = System::new(&model.without(&hidden), 0..p, kalman.entry.colour);
+        let filter = Filter::new(system, &kalman, gain)?;
+        let put = |to: &mut [Mat<f64>], column: usize, change: &Change| {
+            let dk = filter.slope(change)?;
+            for (o, to) in to.iter_mut().enumerate() {
+                places.iter().enumerate().for_each(|(i, place)| to[(*place, column)] = dk[(i, o)]);
+            }
             Some(())
         };
-        let colours = entry.colour.map(|_| of_plant);
+        let mut slopes = vec![Mat::<f64>::zeros(n + m, chart.parameters()); p];
+        let colours = kalman.entry.colour.map(|_| of_plant);
         let (mut column, mut at) = (0, 0);
         for (k, block) in model.blocks.iter().enumerate() {
             if !hidden.contains(&k) {
                 for q in 0..chart.parameters_of(k) {
                     let moved = |entry: usize| chart.direction(k, entry, q);
-                    let change = filter.along((block, at), output, colours, moved);
-                    put(&mut slopes, column + q, &change, 0.0)?;
+                    put(&mut slopes, column + q, &filter.along((block, at), colours, moved))?;
                 }
                 at += block.states;
             }
             column += chart.parameters_of(k);
         }
-        let mut by_entry = Mat::<f64>::zeros(n + m, 2);
-        put(&mut by_entry, 0, &filter.unchanged(), 1.0)?;
-        if entry.colour.is_some() {
+        let mut by_entry = vec![Mat::<f64>::zeros(n + m, kalman.entry.parameters()); p];
+        let directions = kalman.entry.directions();
+        let of_colour = directions.len();
+        for (which, [inputs, sensors]) in directions.into_iter().enumerate() {
+            put(&mut by_entry, which, &Change { inputs, sensors, ..filter.unchanged() })?;
+        }
+        if kalman.entry.colour.is_some() {
             let mut change = filter.unchanged();
             (0..m).for_each(|j| change.a[(of_plant + j, of_plant + j)] = 1.0);
-            put(&mut by_entry, 1, &change, 0.0)?;
+            put(&mut by_entry, of_colour, &change)?;
         }
-        Some(Entering { driven, seen, slopes, by_entry })
+        Some(Entering { kalman, alone, seen, slopes, by_entry })
     }
 
-    /// `epsilon`, the residual behind `1 / H`.
+    /// `epsilon` of a single output, the residual behind `1 / H`.
     #[inline(always)]
-    pub(crate) fn innovation(&self, residual: &Lanes, back: &Lanes) -> Lanes {
-        let mut rest = *residual;
-        self.driven.apply_unmirrored(back, &mut rest);
-        rest
+    pub(crate) fn innovation(&self, residual: &mut Lanes, back: &Lanes) {
+        if let Some(driven) = &self.alone {
+            driven.apply_unmirrored(back, residual);
+        }
     }
 
     /// Pole of the colour.
     pub(crate) fn colour(&self) -> Option<f64> {
-        self.driven.entry.colour
+        self.kalman.entry.colour
     }
 
-    /// K_w of an input.
+    /// Number of free variances, and of the pole of the colour.
+    pub(crate) fn parameters(&self) -> usize {
+        self.kalman.entry.parameters()
+    }
+
+    /// K_w of an input and an output.
     #[inline(always)]
-    pub(crate) fn of_colour(&self, input: usize) -> f64 {
-        self.driven.of_colour[input]
+    pub(crate) fn of_colour(&self, input: usize, output: usize) -> f64 {
+        self.kalman.of_colour[(input, output)]
     }
 
-    /// K of a state.
+    /// K of a state and an output.
     #[inline(always)]
-    pub(crate) fn gain(&self, state: usize) -> f64 {
-        self.driven.gain[state]
+    pub(crate) fn gain(&self, state: usize, output: usize) -> f64 {
+        self.kalman.gain[(state, output)]
     }
 
-    /// Whether the output sees a state.
+    /// Whether an output sees a state.
     #[inline(always)]
     pub(crate) fn sees(&self, state: usize) -> bool {
         self.seen[state]
     }
 
-    /// dK of a state along the parameters, or along lambda and the pole of the colour.
+    /// dK of a state and an output along a parameter.
     #[inline(always)]
-    pub(crate) fn slope(&self, state: usize, parameter: usize) -> f64 {
-        self.slopes[(state, parameter)]
+    pub(crate) fn slope(&self, (state, output): (usize, usize), parameter: usize) -> f64 {
+        self.slopes[output][(state, parameter)]
     }
 
-    /// dK of a state along lambda (0) and along the pole of the colour (1).
+    /// The same along a free variance, or along the pole of the colour, the last.
     #[inline(always)]
-    pub(crate) fn by_entry(&self, state: usize, which: usize) -> f64 {
-        self.by_entry[(state, which)]
+    pub(crate) fn by_entry(&self, (state, output): (usize, usize), which: usize) -> f64 {
+        self.by_entry[output][(state, which)]
     }
 }

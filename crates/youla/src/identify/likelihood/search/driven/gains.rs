@@ -8,6 +8,7 @@ use crate::identify::likelihood::search::state_lanes::resolvent;
 use faer::c64;
 use pulp::{Arch, NullaryFnOnce};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Product of input and output of a block over the largest below which an output does not see what the inputs move there.
 const UNSEEN: f64 = 1e-8;
@@ -30,24 +31,30 @@ pub(crate) struct Gains {
 impl Gains {
     pub(crate) fn new(model: &Model, spectra: &Spectra) -> Self {
         let longest = longest(spectra);
-        let hidden: Vec<Vec<usize>> = (0..model.outputs).map(|output| hidden(model, longest, output)).collect();
+        let hidden: Vec<Vec<usize>> =
+            (0..model.outputs).map(|output| hidden(model, longest, output..output + 1)).collect();
         let every = spectra.lines().div_ceil(LINES).max(1);
-        let triangular = |block: &Block| block.triangular(&[]).map_or_else(|| block.clone(), |(block, _)| block);
-        let blocks: Vec<Block> = model.blocks.iter().map(triangular).collect();
+        let blocks: Vec<Block> = model.blocks.iter().map(Block::quickened).collect();
         let inputs = model.inputs;
         let of = |lines: &Lines| {
             let z: Vec<c64> = lines.z.iter().step_by(every).copied().collect();
-            Arch::new().dispatch(GainsOf { blocks: &blocks, inputs, hidden: &hidden, z: &z })
+            let mut out = Vec::with_capacity(z.len() * hidden.len());
+            let each = |_, (g, l): (&[Lanes], usize)| {
+                let square = |g: &Lanes| g.re[l] * g.re[l] + g.im[l] * g.im[l];
+                out.extend(g.chunks(inputs).map(|g| g.iter().map(square).sum::<f64>()));
+            };
+            Arch::new().dispatch(Responses { blocks: &blocks, inputs, hidden: &hidden, z: &z, each });
+            out
         };
         Gains { values: spectra.records.iter().map(of).collect(), every, hidden }
     }
 }
 
-/// Blocks that an output does not see, and modes that are lines of the noise.
-pub(crate) fn hidden(model: &Model, longest: f64, output: usize) -> Vec<usize> {
+/// Blocks that none of some outputs sees, and modes that are lines of the noise.
+pub(crate) fn hidden(model: &Model, longest: f64, outputs: Range<usize>) -> Vec<usize> {
     let reach = |block: &Block| {
         let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
+        size(&block.b) * size(&block.c[outputs.start * block.states..outputs.end * block.states])
     };
     let largest = model.blocks.iter().map(reach).fold(0.0, f64::max);
     let left_out = |block: &Block| reach(block) <= UNSEEN * largest || is_line(block, longest);
@@ -70,25 +77,26 @@ pub(crate) fn longest(spectra: &Spectra) -> f64 {
     spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64
 }
 
-/// The gains on the lines of a record, with the widest instructions that the processor has.
-struct GainsOf<'a> {
-    blocks: &'a [Block],
-    inputs: usize,
-    hidden: &'a [Vec<usize>],
-    z: &'a [c64],
+/// The responses of the blocks that an output sees, p x m, at some lines, with the widest instructions that the processor has.
+pub(super) struct Responses<'a, F> {
+    pub(super) blocks: &'a [Block],
+    pub(super) inputs: usize,
+    pub(super) hidden: &'a [Vec<usize>],
+    pub(super) z: &'a [c64],
+    /// Takes the place of a line, and its response as one of the lanes.
+    pub(super) each: F,
 }
 
-impl NullaryFnOnce for GainsOf<'_> {
-    type Output = Vec<f64>;
+impl<F: FnMut(usize, (&[Lanes], usize))> NullaryFnOnce for Responses<'_, F> {
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> Vec<f64> {
-        let GainsOf { blocks, inputs: m, hidden, z } = self;
+    fn call(self) {
+        let Responses { blocks, inputs: m, hidden, z, mut each } = self;
         let largest = blocks.iter().map(|b| b.states).max().unwrap_or(0);
         let (mut inverse, mut x) = (vec![Lanes::ZERO; largest * largest], vec![Lanes::ZERO; largest]);
         let mut g = vec![Lanes::ZERO; hidden.len() * m];
-        let mut out = Vec::with_capacity(z.len() * hidden.len());
-        for z in z.chunks(LANES) {
+        for (group, z) in z.chunks(LANES).enumerate() {
             let at = Lanes::gather(|l| z[l.min(z.len() - 1)]);
             g.fill(Lanes::ZERO);
             for (place, block) in blocks.iter().enumerate() {
@@ -106,11 +114,9 @@ impl NullaryFnOnce for GainsOf<'_> {
                     }
                 }
             }
-            let square = |g: &Lanes, l: usize| g.re[l] * g.re[l] + g.im[l] * g.im[l];
             for l in 0..z.len() {
-                out.extend(g.chunks(m).map(|g| g.iter().map(|g| square(g, l)).sum::<f64>()));
+                each(group * LANES + l, (&g, l));
             }
         }
-        out
     }
 }

@@ -1,4 +1,4 @@
-//! Noise at an output that enters at the inputs of the plant: torque of cogging and of a current controller, load, turbulence.
+//! Noise at the outputs that enters at the inputs of the plant: torque of cogging and of a current controller, load, turbulence.
 //!
 //! ```text
 //! spectrum of v_i = sigma^2 (1 + lambda |G_i|^2) = sigma^2 |H_i|^2,     H_i = 1 + C_i (z I - A)^-1 K_i
@@ -7,21 +7,30 @@
 //! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
 //! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
 //!
+//! Several outputs see the same noise, so that one Kalman filter has them together ([`joint`]); of many outputs each has its own.
+//!
 //! Torque that changes slowly has a colour, `w = e / (z - c)`: one state for each input behind white noise. An autoregression of the whole would
 //! take dozens of coefficients for it, and in a loop a wrong plant takes fewer.
 
 pub(crate) mod entering;
 mod gains;
+pub(crate) mod joint;
+mod kalman;
 mod size;
+mod sizes;
 
 use super::autoregression::Regression;
 pub(crate) use gains::{Gains, NARROW, has_line, is_line, longest};
+pub(crate) use joint::Joint;
+pub(crate) use kalman::{Entry, Kalman};
+pub(crate) use sizes::Bins;
 
 use super::model::Model;
+use super::separable::separable;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes};
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
-use crate::linalg::{RiccatiProblem, block, dare, eigenvalues};
-use faer::{Mat, Scale, c64};
+use crate::linalg::eigenvalues;
+use faer::{Mat, c64};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -37,54 +46,12 @@ pub(crate) struct Driven {
     sections: Vec<[f64; 4]>,
     /// Those of the numerator with the poles outside of the unit circle where they are.
     over: Vec<[f64; 2]>,
-    /// Size and colour.
-    pub(crate) entry: Entry,
-    /// Product of the magnitudes of the poles outside of the unit circle, which the filter mirrors: `1 / H_i` over its size.
-    pub(crate) unstable: f64,
-    /// K_i, one for each state of the model, zero for those that the output does not see.
-    pub(crate) gain: Vec<f64>,
-    /// The same of the colour, one for each input; none of white noise.
-    pub(crate) of_colour: Vec<f64>,
-    /// Covariance of the states that the output sees and of the colours before a sample is known, over that of the sensor's noise.
-    covariance: Mat<f64>,
+    /// Its Kalman filter, over whose `unstable` the filter is smaller: it mirrors the poles outside of the unit circle.
+    pub(crate) kalman: Kalman,
     /// A of the model.
     pub(crate) a: Mat<f64>,
-    /// B of the model, zero for states that the output does not see.
-    pub(crate) b: Mat<f64>,
     /// C of the model, its row of the output.
     pub(crate) c: Mat<f64>,
-}
-
-/// Size of noise at the inputs, and its pole where it has a colour.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
-    /// lambda.
-    pub(crate) ratio: f64,
-    /// c.
-    pub(crate) colour: Option<f64>,
-}
-
-/// What white noise drives: the plant, behind one state for each input where the noise has a colour.
-struct System {
-    a: Mat<f64>,
-    b: Mat<f64>,
-    /// Of one output.
-    c: Mat<f64>,
-}
-
-impl System {
-    fn new(plant: &Model, output: usize, colour: Option<f64>) -> Self {
-        let (a, b, c) = plant.matrices();
-        let c = c.subrows(output, 1).to_owned();
-        let Some(pole) = colour else { return System { a, b, c } };
-        let (n, m) = (a.nrows(), b.ncols());
-        let colours = Mat::<f64>::identity(m, m);
-        System {
-            a: block(&[&[a.as_ref(), b.as_ref()], &[Mat::zeros(m, n).as_ref(), (&colours * pole).as_ref()]]),
-            b: block(&[&[Mat::zeros(n, m).as_ref()], &[colours.as_ref()]]),
-            c: block(&[&[c.as_ref(), Mat::zeros(1, m).as_ref()]]),
-        }
-    }
 }
 
 impl Driven {
@@ -100,50 +67,32 @@ impl Driven {
         let samples = spectra.samples() as f64;
         let poles = model.poles();
         let grows = || poles.iter().any(|p| p.norm().ln() > GROWTH / samples);
-        if poles.is_empty() || spectra.outputs > 1 && grows() {
+        if poles.is_empty() || separable(spectra.outputs) && grows() {
             return None;
         }
-        let entry = size::entry((spectra, gains), residual, (output, behind), coloured)?;
+        let (ratio, colour) = size::entry((spectra, gains), residual, (output, behind), coloured)?;
+        let entry = Entry::of_one(ratio, model.inputs, colour);
         Driven::of_entry(model, &gains.hidden[output], (output, entry))
     }
 
     /// Noise of a known size and colour at the inputs, without the blocks that are hidden from the output.
     pub(crate) fn of_entry(model: &Model, hidden: &[usize], (output, entry): (usize, Entry)) -> Option<Self> {
-        let plant = model.without(hidden);
-        let System { a, b, c } = System::new(&plant, output, entry.colour);
-        let q = &b * b.transpose() * Scale(entry.ratio);
-        let one = Mat::<f64>::identity(1, 1);
-        let dual = RiccatiProblem { a: a.transpose(), b: c.transpose(), q: q.as_ref(), r: one.as_ref(), s: None };
-        let solution = dare("the noise", &dual).ok()?;
-        let k = solution.gain.transpose().to_owned();
-        let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
+        let colour = entry.colour;
+        let (kalman, closed) = Kalman::new(model, hidden, (output..output + 1, entry))?;
+        let zeros = eigenvalues("the noise", closed.as_ref()).ok()?;
         let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
-        let unstable = plant.poles().iter().map(|p| p.norm().max(1.0)).product();
-        let colours = entry.colour.map_or(Vec::new(), |pole| vec![c64::new(pole, 0.0); model.inputs]);
-        let poles = [plant.poles(), colours].concat();
+        let colours = colour.map_or(Vec::new(), |pole| vec![c64::new(pole, 0.0); model.inputs]);
+        let poles = [model.without(hidden).poles(), colours].concat();
         let [inside, over, under] = [poles.iter().copied().map(mirrored).collect(), poles, zeros].map(quadratics);
         let sections = inside.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
-        let (a, mut b, c) = model.matrices();
-        let (mut gain, mut states, mut at) = (vec![0.0; a.nrows()], 0..0, 0);
-        for (place, block) in model.blocks.iter().enumerate() {
-            states = states.end..states.end + block.states;
-            for state in states.clone() {
-                if hidden.contains(&place) {
-                    b.row_mut(state).fill(0.0);
-                } else {
-                    gain[state] = k[(at, 0)];
-                    at += 1;
-                }
-            }
-        }
-        let of_colour = (at..k.nrows()).map(|j| k[(j, 0)]).collect();
+        let (a, _, c) = model.matrices();
         let c = c.subrows(output, 1).to_owned();
-        Some(Driven { sections, over, entry, unstable, gain, of_colour, covariance: solution.x, a, b, c })
+        Some(Driven { sections, over, kalman, a, c })
     }
 
     /// Number of its parameters.
     pub(crate) fn parameters(&self) -> usize {
-        1 + usize::from(self.entry.colour.is_some())
+        self.kalman.entry.parameters()
     }
 
     /// Multiplies by `1 / H_i`, poles outside of the unit circle mirrored, given `1 / z`.

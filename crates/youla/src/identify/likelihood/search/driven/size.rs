@@ -1,6 +1,5 @@
 //! The most likely size and colour of noise at the inputs.
 
-use super::Entry;
 use super::gains::{Gains, LINES};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::autoregression::Regression;
@@ -12,20 +11,20 @@ const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 const LARGE: f64 = 1e100;
 /// Poles c of noise with a colour that are tried, with corners 1 - c from 0.1 down to 1e-4 rad per sample, a factor of 3 apart. Chosen: of those
 /// between two the autoregression describes what is left.
-const COLOURS: [f64; 6] = [0.9, 0.97, 0.99, 0.997, 0.999, 0.9999];
+pub(super) const COLOURS: [f64; 6] = [0.9, 0.97, 0.99, 0.997, 0.999, 0.9999];
 
-/// Size and colour of such noise in the residual of an output, with an autoregression behind it; `None` where white noise alone has the lesser
+/// Size lambda and colour of such noise in the residual of an output, with an autoregression behind it; `None` where white noise alone has the lesser
 /// criterion of Schwarz.
 pub(super) fn entry(
     (spectra, gains): (&Spectra, &Gains),
     residual: &[Vec<c64>],
     (output, behind): (usize, &Regression),
     coloured: bool,
-) -> Option<Entry> {
+) -> Option<(f64, Option<f64>)> {
     let samples = spectra.samples() as f64;
     let mut lines = lines((spectra, gains), residual, (output, behind));
     let (mut least, ratio) = size(&lines, samples);
-    let mut best = Entry { ratio: ratio?, colour: None };
+    let mut best = (ratio?, None);
     if coloured {
         let back: Vec<c64> =
             spectra.records.iter().flat_map(|lines| lines.z.iter().step_by(gains.every).map(|z| z.conj())).collect();
@@ -36,7 +35,7 @@ pub(super) fn entry(
             if let (cost, Some(ratio)) = size(&lines, samples)
                 && cost < least - samples.ln()
             {
-                (least, best) = (cost, Entry { ratio, colour: Some(pole) });
+                (least, best) = (cost, (ratio, Some(pole)));
             }
         }
     }
@@ -62,7 +61,7 @@ fn lines(
 }
 
 /// The most likely lambda, and its cost; `None` where white noise alone has the lesser criterion of Schwarz.
-fn size(lines: &[[f64; 3]], samples: f64) -> (f64, Option<f64>) {
+pub(super) fn size(lines: &[[f64; 3]], samples: f64) -> (f64, Option<f64>) {
     let cost = |ratio: f64| {
         let (mut power, mut logarithms, mut count) = (0.0, 0.0, 0.0);
         // The logarithm of a product of several shapes is taken at once, where as many lines of the circle stand behind each.

@@ -5,6 +5,7 @@ mod noise;
 use super::block::Block;
 use super::chart::Chart;
 use super::driven::entering::Entering;
+use super::driven::joint::Filters;
 use super::model::Model;
 use super::noise::Noise;
 use super::state_lanes::states;
@@ -22,12 +23,21 @@ pub(crate) struct Place<'a> {
     pub(crate) model: &'a Model,
     pub(crate) chart: &'a Chart,
     pub(crate) noise: &'a Noise,
-    /// Noise at the inputs of each output, whose filter moves with the parameters; none where all filters are held.
-    pub(crate) entering: &'a [Option<Entering>],
+    /// Noise at the inputs, whose filter moves with the parameters; `None` where the filter is held.
+    pub(crate) entering: Option<&'a Entering>,
+    /// t_w, the ends of its colours, where the filter moves.
+    pub(crate) ends: &'a [f64],
     /// Whether the coefficients of the noise have columns, behind those of the parameters.
     pub(crate) coefficients: bool,
     /// Further columns, lines x p x count, and their count.
     pub(crate) more: (&'a [c64], usize),
+}
+
+impl Place<'_> {
+    /// Number of columns of the ends of the colours of noise at the inputs, before that of the residual.
+    pub(crate) fn ends_of_colours(&self) -> usize {
+        self.noise.joint.as_ref().map_or(0, |joint| joint.ends())
+    }
 }
 
 /// The rows of [`LANES`] lines.
@@ -40,11 +50,15 @@ pub(crate) struct Rows {
     left: Vec<Lanes>,
     full: Vec<Lanes>,
     filters: Vec<Lanes>,
+    /// `1 / H` of outputs that see noise at the inputs together.
+    joint: Option<Filters>,
     /// Of each output `epsilon`, and w of each input.
     innovations: Vec<Lanes>,
     entered: Vec<Lanes>,
     /// X with them of one block.
     filtered: Vec<Lanes>,
+    /// Of each output what is to be filtered.
+    unfiltered: Vec<Lanes>,
     /// L of all states of the plant and of the colours, `L B / (z - c)`, of each output.
     all_left: Vec<Lanes>,
 }
@@ -66,7 +80,8 @@ impl NullaryFnOnce for Group<'_, '_> {
 }
 
 impl Rows {
-    pub(crate) fn new(model: &Model, columns: usize) -> Self {
+    pub(crate) fn new(place: &Place<'_>, columns: usize) -> Self {
+        let model = place.model;
         let (p, m) = (model.outputs, model.inputs);
         let s = model.blocks.iter().map(|b| b.states).max().unwrap_or(0);
         let zeros = |count: usize| vec![Lanes::ZERO; count];
@@ -78,9 +93,11 @@ impl Rows {
             left: zeros(p * s),
             full: zeros(s * (s + m)),
             filters: zeros(p),
+            joint: place.noise.joint.as_ref().map(|joint| joint.filters()),
             innovations: zeros(p),
-            entered: zeros(p * m),
+            entered: zeros(m),
             filtered: zeros(s),
+            unfiltered: zeros(p),
             all_left: zeros(p * (model.order() + m)),
         }
     }
@@ -108,9 +125,11 @@ impl Rows {
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
-        let enters = place.entering.iter().any(Option::is_some);
-        if enters {
-            self.innovations(place, (&z, &ends, &u));
+        if let (Some(joint), Some(filters)) = (&place.noise.joint, &mut self.joint) {
+            joint.filter(&z, filters);
+        }
+        if let Some(entering) = place.entering {
+            self.innovations(place, entering, (&z, &ends, &u));
         }
         let (mut state, mut column) = (0, model.end_count());
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
@@ -121,17 +140,21 @@ impl Rows {
         }
         self.drift((&z, &ends), &place.t[state..], state);
         self.direct(place, &u, column);
-        if enters {
-            self.gains(place, &z, model.end_count());
+        self.without_ends(place, &ends);
+        if let Some(entering) = place.entering {
+            self.gains(place, entering, (&z, model.end_count()));
         }
         if place.coefficients {
             self.coefficients(place, &z.conj(), model.end_count() + chart.parameters());
         }
-        let (more, count) = place.more;
+        let ((more, count), of_colours) = (place.more, place.ends_of_colours());
+        let end = columns - 1 - of_colours;
         for o in 0..p {
             for e in 0..count {
-                self.values[o * columns + columns - 1 - count + e] =
-                    Lanes::gather(|l| more[(line(l) * p + o) * count + e]);
+                self.values[o * columns + end - count + e] = Lanes::gather(|l| more[(line(l) * p + o) * count + e]);
+            }
+            if let Some(joint) = &self.joint {
+                (0..of_colours).for_each(|j| self.values[o * columns + end + j] = joint.driven((o, j), &ends));
             }
         }
         self.whiten(place.noise, &z);
@@ -159,16 +182,16 @@ impl Rows {
         directions: &Mat<f64>,
         (ends, u): (&Lanes, &[Lanes]),
         at: [usize; 2],
-        entering: &[Option<Entering>],
+        entering: Option<&Entering>,
     ) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
         let entries = s * (s + m);
+        let entering = entering.filter(|entering| entering.sees(at[0]));
+        if let Some(entering) = entering {
+            self.filtered(block, at[0], entering);
+        }
+        let x = if entering.is_some() { &self.filtered } else { &self.x };
         for o in 0..block.c.len() / s {
-            let entering = entering.get(o).and_then(Option::as_ref).filter(|entering| entering.sees(at[0]));
-            if let Some(entering) = entering {
-                self.filtered(block, at[0], (o, entering));
-            }
-            let x = if entering.is_some() { &self.filtered } else { &self.x };
             for i in 0..s {
                 let left = &self.left[o * s + i];
                 self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
@@ -178,7 +201,7 @@ impl Rows {
                     for j in 0..m {
                         let mut drive = u[j];
                         if entering.is_some() {
-                            drive.add_scaled(&self.entered[o * m + j], 1.0);
+                            drive.add_scaled(&self.entered[j], 1.0);
                         }
                         self.full[s * s + i * m + j].set_product(left, &drive);
                     }
@@ -221,10 +244,13 @@ impl Rows {
         }
     }
 
-    /// Autoregression of each output, then the inverse root of the covariance.
+    /// What several outputs see of noise at the inputs, autoregression of each output, then the inverse root of the covariance.
     #[inline(always)]
     fn whiten(&mut self, noise: &Noise, z: &Lanes) {
         let (p, columns) = (self.filters.len(), self.columns);
+        if let Some(joint) = &self.joint {
+            (0..columns).for_each(|c| joint.apply(&mut self.values[c..], columns, &mut self.unfiltered));
+        }
         let back = z.conj();
         let root = |o: usize, l: usize| noise.root[(o, l)];
         for (o, (filter, r)) in self.filters.iter_mut().zip(&noise.regression).enumerate() {

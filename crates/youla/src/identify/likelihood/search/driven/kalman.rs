@@ -1,0 +1,134 @@
+//! The Kalman filter of outputs that see noise at the inputs of a plant.
+
+use crate::identify::likelihood::search::model::Model;
+use crate::linalg::{RiccatiProblem, block, dare};
+use faer::linalg::solvers::DenseSolveCore;
+use faer::{Mat, Scale, c64};
+use std::ops::Range;
+
+/// Variances of the noise, up to a common factor, and the pole of that at the inputs where it has a colour.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    /// Of the noise at each input.
+    pub(crate) inputs: Vec<f64>,
+    /// Of the noise of the sensor of each output.
+    pub(crate) sensors: Vec<f64>,
+    /// c.
+    pub(crate) colour: Option<f64>,
+}
+
+impl Entry {
+    /// Noise of equal size at all inputs that one output sees: lambda beside a sensor of unit noise.
+    pub(crate) fn of_one(ratio: f64, inputs: usize, colour: Option<f64>) -> Self {
+        Entry { inputs: vec![ratio; inputs], sensors: vec![1.0], colour }
+    }
+
+    /// lambda of one output.
+    pub(crate) fn ratio(&self) -> f64 {
+        self.inputs[0]
+    }
+
+    /// What of the variances is free, as changes of those at the inputs and of those of the sensors.
+    pub(crate) fn directions(&self) -> Vec<[Vec<f64>; 2]> {
+        let (m, p) = (self.inputs.len(), self.sensors.len());
+        let unit = |count: usize, at: Option<usize>| (0..count).map(|i| f64::from(at == Some(i))).collect();
+        if p == 1 {
+            return vec![[vec![1.0; m], vec![0.0]]];
+        }
+        let of_inputs = (0..m).map(|j| [unit(m, Some(j)), unit(p, None)]);
+        of_inputs.chain((1..p).map(|i| [unit(m, None), unit(p, Some(i))])).collect()
+    }
+
+    /// Number of its parameters.
+    pub(crate) fn parameters(&self) -> usize {
+        let sizes = if self.sensors.len() == 1 { 1 } else { self.inputs.len() + self.sensors.len() - 1 };
+        sizes + usize::from(self.colour.is_some())
+    }
+}
+
+/// What white noise drives: the plant, behind one state for each input where the noise has a colour.
+pub(super) struct System {
+    pub(super) a: Mat<f64>,
+    pub(super) b: Mat<f64>,
+    pub(super) c: Mat<f64>,
+}
+
+impl System {
+    pub(super) fn new(plant: &Model, outputs: Range<usize>, colour: Option<f64>) -> Self {
+        let (a, b, c) = plant.matrices();
+        let c = c.subrows(outputs.start, outputs.len()).to_owned();
+        let Some(pole) = colour else { return System { a, b, c } };
+        let (n, m) = (a.nrows(), b.ncols());
+        let colours = Mat::<f64>::identity(m, m);
+        System {
+            a: block(&[&[a.as_ref(), b.as_ref()], &[Mat::zeros(m, n).as_ref(), (&colours * pole).as_ref()]]),
+            b: block(&[&[Mat::zeros(n, m).as_ref()], &[colours.as_ref()]]),
+            c: block(&[&[c.as_ref(), Mat::zeros(outputs.len(), m).as_ref()]]),
+        }
+    }
+}
+
+/// Its gain.
+#[derive(Debug, Clone)]
+pub(crate) struct Kalman {
+    /// Variances and colour.
+    pub(crate) entry: Entry,
+    /// K, states of the model x outputs, zero for states that are hidden.
+    pub(crate) gain: Mat<f64>,
+    /// B of the model, zero for states that are hidden.
+    pub(crate) b: Mat<f64>,
+    /// The same as K of the colour, m x outputs; without rows of white noise.
+    pub(crate) of_colour: Mat<f64>,
+    /// Covariance of the states that are not hidden and of the colours before a sample is known, and S of the innovations.
+    pub(super) covariance: Mat<f64>,
+    size: Mat<f64>,
+    /// Product of the magnitudes of the poles outside of the unit circle.
+    pub(crate) unstable: f64,
+}
+
+impl Kalman {
+    /// Of some outputs, without the blocks that are hidden from them; `A - K C` of plant and colours comes with it.
+    pub(super) fn new(
+        model: &Model,
+        hidden: &[usize],
+        (outputs, entry): (Range<usize>, Entry),
+    ) -> Option<(Self, Mat<f64>)> {
+        let plant = model.without(hidden);
+        let System { a, b, c } = System::new(&plant, outputs.clone(), entry.colour);
+        let largest = entry.inputs.iter().copied().fold(0.0, f64::max);
+        let shares = Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * (entry.inputs[j] / largest));
+        let q = &shares * b.transpose() * Scale(largest);
+        let sensors = diagonal(&entry.sensors);
+        let dual = RiccatiProblem { a: a.transpose(), b: c.transpose(), q: q.as_ref(), r: sensors.as_ref(), s: None };
+        let solution = dare("the noise", &dual).ok()?;
+        let k = solution.gain.transpose().to_owned();
+        let mut gain = Mat::zeros(model.order(), outputs.len());
+        let (_, mut b, _) = model.matrices();
+        let (mut states, mut at) = (0..0, 0);
+        for (place, block) in model.blocks.iter().enumerate() {
+            states = states.end..states.end + block.states;
+            if hidden.contains(&place) {
+                b.subrows_mut(states.start, block.states).fill(0.0);
+            } else {
+                gain.subrows_mut(states.start, block.states).copy_from(k.subrows(at, block.states));
+                at += block.states;
+            }
+        }
+        let of_colour = k.subrows(at, k.nrows() - at).to_owned();
+        let unstable = plant.poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
+        let closed = &a - &k * &c;
+        let size = &c * &solution.x * c.transpose() + sensors;
+        Some((Kalman { entry, gain, b, of_colour, covariance: solution.x, size, unstable }, closed))
+    }
+}
+
+impl Kalman {
+    /// Inverse of the covariance of the innovations, S = C P C' + R.
+    pub(super) fn precision(&self) -> Mat<f64> {
+        self.size.partial_piv_lu().inverse()
+    }
+}
+
+pub(super) fn diagonal(values: &[f64]) -> Mat<f64> {
+    Mat::from_fn(values.len(), values.len(), |i, j| if i == j { values[i] } else { 0.0 })
+}

@@ -8,6 +8,7 @@
 
 pub(crate) mod autoregression;
 pub(crate) mod balancing;
+mod begin;
 pub(crate) mod block;
 pub(crate) mod by_output;
 pub(crate) mod chart;
@@ -28,6 +29,7 @@ pub(crate) mod unstable;
 
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
+use begin::begun;
 use by_output::{Ends, Normal};
 use chart::Chart;
 use driven::has_line;
@@ -77,10 +79,6 @@ const REGROUPED: usize = 2;
 const KEPT: f64 = 0.5;
 /// Steps that are left for all lines behind those on groups, at least: most searches take none or one there.
 const LAST: usize = 5;
-/// Times that the ends of a start and the filter of its noise are taken from each other: the third changes little.
-const SETTLED: usize = 3;
-/// Coefficients of an autoregression from which it may stand for noise at the inputs: a pole and a zero describe drift.
-const LONG: usize = 3;
 /// Diagonal of the factor, relative to the largest, below which the records do not determine a direction: rounding of a sum of squares.
 const UNDETERMINED: f64 = 1e-10;
 
@@ -195,30 +193,7 @@ fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Nois
 
 /// The same on lines as they are.
 fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
-    let mut point = reblocked(&start)?;
-    let (mut least, mut noise) = cost(spectra, &point, options);
-    if !least.is_finite() {
-        return None;
-    }
-    if let Some(trial) = from_inputs(spectra, &point, &noise, options) {
-        let (value, other) = cost(spectra, &trial, options);
-        if value < least {
-            (point, least, noise) = (trial, value, other);
-        }
-    }
-    // The ends of the start are those of another filter: noise at the inputs of an integrator takes them for its own.
-    for _ in 0..SETTLED {
-        if !noise.enters_at_inputs() {
-            break;
-        }
-        let trial = with_best_ends(spectra, point.model.clone(), &noise);
-        let (value, settled) = cost(spectra, &trial, options);
-        let gain = least - value;
-        if gain.is_nan() || gain < options.tolerance {
-            break;
-        }
-        (point, least, noise) = (trial, value, settled);
-    }
+    let (mut point, mut least, mut noise) = begun(spectra, &start, options)?;
     let (mut damping, mut steps, mut given_up) = (Damping::new(FIRST_DAMPING), 0, false);
     let mut parameters = Chart::new(&point.model, options.feedthrough).parameters();
     // First with the filter of the noise held, which takes the fewest steps; noise at the inputs then moves it with the plant.
@@ -252,7 +227,9 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         if gain < options.tolerance {
             // A mode that is a line of the noise is first taken out of the outputs, at the frequency that it has here.
             let last = || filter_moves || !noise.enters_at_inputs() || has_line(&point.model, spectra);
-            if !options.filter_moves || last() {
+            // Held, the filter of several outputs draws the plant too far for models to be compared.
+            let moves = options.filter_moves || noise.joint.is_some();
+            if !moves || last() {
                 break;
             }
             (filter_moves, damping) = (true, Damping::new(FIRST_DAMPING));
@@ -269,21 +246,6 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         noise = cost(spectra, &point, options).1;
     }
     Some(Found { point, noise, deviance: least, parameters, steps, given_up, feedthrough: options.feedthrough })
-}
-
-/// A start whose residual a long autoregression describes, of several outputs, as if all of it entered at the inputs: B, D and the ends, and
-/// the sizes of that noise, by turns. Beside drift of an integrator, least squares of the outputs find its gain hundreds of times too large,
-/// and from there a search ends at a wrong plant with long autoregressions.
-fn from_inputs(spectra: &Spectra, start: &Point, noise: &Noise, options: &SearchOptions) -> Option<Point> {
-    if noise.joint.is_some() || noise.parameters() <= LONG * spectra.outputs {
-        return None;
-    }
-    let mut point = start.clone();
-    for _ in 0..SETTLED {
-        let noise = Noise::at_inputs(spectra, &point.residuals(spectra), options.noise_order, &point.model)?;
-        point = with_best_inputs(spectra, point.model, &noise, options.feedthrough);
-    }
-    Some(point)
 }
 
 /// What a search near a point needs: a triangular factor, or normal equations by outputs.

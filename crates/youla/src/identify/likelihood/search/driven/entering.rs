@@ -4,8 +4,8 @@
 //! ```text
 //! dG u + dH epsilon,      H = 1 + C M K,      M = (z I - A)^-1
 //! ```
-//! before the autoregression: of the output of a Kalman filter of all outputs, `X = M (B (u + w) + z t + K epsilon)` with w the estimated noise at the inputs
-//! where it has a colour, `w = K_w epsilon / (z - c)`, and `C M dK epsilon`. In a loop that holds the output, u is at low frequencies minus
+//! before the autoregression: of the output of a Kalman filter of all outputs, `X = M (B (u + w) + z t + K epsilon)` with w the estimated
+//! noise at the inputs where it has a colour, `w = (K_w epsilon + z t_w) / (z - c)`, and `C M dK epsilon`. In a loop that holds the output, u is at low frequencies minus
 //! the noise at the input. With the filter held, the squares would be least for a plant without gain there, and the information on its gain many
 //! times too large.
 //!

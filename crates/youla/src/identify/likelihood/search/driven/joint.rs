@@ -4,9 +4,11 @@
 //! v = H epsilon,     H = 1 + C M K + C M B K_w / (z - c),     M = (z I - A)^-1
 //! ```
 //! with the gains K of the states and K_w of the colours of one Kalman filter, whose innovations epsilon are those of all outputs, also of
-//! an unstable plant. Both ends of a record are not alike, `w(N) - w(0)` of each colour: what `z t_w / (z - c)` drives is taken from the residual of
-//! each record by least squares. A plant with a mode in excess would describe it. Outputs that see one torque are of one mind about it: with a filter for each, the cross spectrum that is left draws the
-//! plant in a loop, by up to its own size where two coupled axes have slow torque.
+//! an unstable plant. With a filter for each output the cross spectrum of the residuals is not described, and in a loop the plant is wrong by
+//! up to its own size where two coupled axes have slow torque.
+//!
+//! The noise w of an input differs between the two ends of a record, `t_w = w(N) - w(0)`: what `z t_w / (z - c)` drives is taken from the
+//! residual of each record by least squares. A mode in excess of the plant would describe it otherwise.
 
 use super::gains::hidden;
 use super::sizes::Bins;
@@ -69,7 +71,7 @@ impl Joint {
     pub(crate) fn filter(&self, z: &Lanes, to: &mut Filters) {
         let p = self.kalman.gain.ncols();
         let m = self.kalman.of_colour.nrows();
-        let Filters { h, whitener, left, response, colour, work } = to;
+        let Filters { h, whitener, response, colour, work, .. } = to;
         (0..p * p).for_each(|x| h[x] = if x % (p + 1) == 0 { Lanes::ZERO.shifted(1.0) } else { Lanes::ZERO });
         response[..p * m].fill(Lanes::ZERO);
         for (block, gain) in &self.blocks {
@@ -77,10 +79,10 @@ impl Joint {
             resolvent(block, z, work);
             for o in 0..p {
                 for j in 0..s {
-                    *left = Lanes::ZERO;
+                    let mut left = Lanes::ZERO;
                     (0..s).for_each(|i| left.add_scaled(&work[i * s + j], block.c[o * s + i]));
-                    (0..p).for_each(|l| h[o * p + l].add_scaled(left, gain[j * p + l]));
-                    (0..m).for_each(|q| response[o * m + q].add_scaled(left, block.b[j * m + q]));
+                    (0..p).for_each(|l| h[o * p + l].add_scaled(&left, gain[j * p + l]));
+                    (0..m).for_each(|q| response[o * m + q].add_scaled(&left, block.b[j * m + q]));
                 }
             }
         }
@@ -162,9 +164,17 @@ impl Joint {
 
     /// Its variables on lines.
     pub(crate) fn filters(&self) -> Filters {
-        let (p, m) = (self.kalman.gain.ncols(), self.kalman.of_colour.nrows());
+        let (p, inputs) = (self.kalman.gain.ncols(), self.ends());
         let largest = self.blocks.iter().map(|(block, _)| block.states).max().unwrap_or(0);
-        Filters::new(p, m, largest)
+        let zeros = |count: usize| vec![Lanes::ZERO; count];
+        Filters {
+            h: zeros(p * p),
+            whitener: zeros(p * p),
+            inputs,
+            response: zeros(p * inputs),
+            colour: Lanes::ZERO,
+            work: zeros(largest * largest),
+        }
     }
 }
 
@@ -172,31 +182,19 @@ impl Joint {
 pub(crate) struct Filters {
     pub(crate) h: Vec<Lanes>,
     pub(crate) whitener: Vec<Lanes>,
-    left: Lanes,
-    /// C M B, p x m, and 1 / (z - c).
+    /// Inputs whose noise has a colour: all or none.
+    inputs: usize,
+    /// C M B of these, p x inputs, and 1 / (z - c).
     response: Vec<Lanes>,
     colour: Lanes,
     work: Vec<Lanes>,
 }
 
 impl Filters {
-    fn new(outputs: usize, inputs: usize, states: usize) -> Self {
-        let zeros = |count: usize| vec![Lanes::ZERO; count];
-        Filters {
-            h: zeros(outputs * outputs),
-            whitener: zeros(outputs * outputs),
-            left: Lanes::ZERO,
-            response: zeros(outputs * inputs),
-            colour: Lanes::ZERO,
-            work: zeros(states * states),
-        }
-    }
-
     /// What the end of the colour of an input drives at an output, given `z` times the share of the ends.
     #[inline(always)]
     pub(crate) fn driven(&self, (output, input): (usize, usize), ends: &Lanes) -> Lanes {
-        let inputs = self.response.len() / self.h.len().isqrt();
-        self.response[output * inputs + input].times(&self.colour).times(ends)
+        self.response[output * self.inputs + input].times(&self.colour).times(ends)
     }
 
     /// `1 / H` times values of all outputs, which are `stride` apart.

@@ -68,7 +68,7 @@ impl System {
     }
 }
 
-/// Its gain.
+/// Gains and covariances of the filter.
 #[derive(Debug, Clone)]
 pub(crate) struct Kalman {
     /// Variances and colour.

@@ -36,6 +36,8 @@ const SIDEBANDS: f64 = 2.0;
 const SIDEBAND: f64 = 0.6;
 /// Samples of a record for each slow change at least.
 const SAMPLES_PER_CHANGE: usize = 8;
+/// Lines beside the band that does not count from which the amplitudes are estimated, for each slow change: ten equations for each unknown.
+const AROUND: f64 = 5.0;
 /// Sweeps over the disturbances, which are nearly orthogonal.
 const SWEEPS: usize = 2;
 
@@ -164,7 +166,7 @@ fn less_lines(
         let mut taken = now.lines.clone();
         narrow.turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
         let outputs = [(all.experiments, &residuals[0]), (fresh, &residuals[1])].map(|(records, residuals)| {
-            let of = |(e, left): (&Experiment<'_>, &Option<Mat<f64>>)| match left {
+            let of = |(e, left): (&Experiment<'_>, &Option<Residual>)| match left {
                 Some(left) => e.y - disturbance(left, e.y.nrows(), &taken),
                 None => e.y.to_owned(),
             };
@@ -240,9 +242,9 @@ impl Narrow {
         (!places.is_empty()).then_some(Narrow { model, places, turns, longest })
     }
 
-    /// What the other modes leave of the outputs of some records, samples x p behind the first that are skipped; `None` for a record that has no
+    /// What the other modes leave of the outputs of some records, behind the first samples that are skipped; `None` for a record that has no
     /// lines. The ends of the records are those of the outputs as they are without earlier lines (`clean`).
-    fn residuals(&self, clean: &Problem<'_>, choice: &Choice, records: &[Experiment<'_>]) -> Vec<Option<Mat<f64>>> {
+    fn residuals(&self, clean: &Problem<'_>, choice: &Choice, records: &[Experiment<'_>]) -> Vec<Option<Residual>> {
         let whole = with_best_ends(&clean.spectra(&choice.delays), self.model.clone(), &choice.found.noise);
         let mut first = 0;
         let mut left_out = Vec::new();
@@ -258,35 +260,28 @@ impl Narrow {
         let of = |e: &Experiment<'_>| {
             let rows = e.y.nrows();
             let v = long_enough(rows, clean.skip).then(|| residuals.next()).flatten()?;
-            Some(in_time(&v, rows - clean.skip, &clean.sizes.y))
+            let (samples, p) = (rows - clean.skip, clean.sizes.y.len());
+            // The spectra are those of outputs over their sizes, over the root of the samples.
+            let scale = |i: usize| clean.sizes.y[i] * (samples as f64).sqrt();
+            Some(Residual { lines: Mat::from_fn(v.len() / p, p, |k, i| v[k * p + i] * scale(i)), samples })
         };
         records.iter().map(of).collect()
     }
 }
 
-/// A signal in time, samples x channels of some sizes, from its lines.
-fn in_time(v: &[c64], samples: usize, sizes: &[f64]) -> Mat<f64> {
-    let p = sizes.len();
-    let back = FftPlanner::new().plan_fft_inverse(samples);
-    let mut out = Mat::<f64>::zeros(samples, p);
-    for (i, size) in sizes.iter().enumerate() {
-        let mut work = vec![c64::ZERO; samples];
-        for k in 1..=v.len() / p {
-            work[k] = v[(k - 1) * p + i];
-            work[samples - k] = work[k].conj();
-        }
-        back.process(&mut work);
-        let size = size / (samples as f64).sqrt();
-        (0..samples).for_each(|t| out[(t, i)] = work[t].re * size);
-    }
-    out
+/// The transform of the residual of the last samples of a record: lines from the first x channels.
+struct Residual {
+    lines: Mat<c64>,
+    samples: usize,
 }
 
-/// Disturbances by least squares from what is left of the last samples of a record, over all its rows.
-fn disturbance(residual: &Mat<f64>, rows: usize, lines: &[Line]) -> Mat<f64> {
-    let (mut left, samples) = (residual.clone(), residual.nrows());
-    let mut all = Mat::<f64>::zeros(rows, residual.ncols());
-    for Line { mask, changes } in (0..SWEEPS).flat_map(|_| lines) {
+/// Disturbances over all rows of a record. The amplitudes of each are those of least squares on the lines around it, where the noise is
+/// that of its frequency: a drift has thousands of times the power of the noise there.
+fn disturbance(residual: &Residual, rows: usize, taken: &[Line]) -> Mat<f64> {
+    let Residual { lines, samples } = residual;
+    let fft = FftPlanner::new().plan_fft_forward(*samples);
+    let (mut left, mut all) = (lines.clone(), Mat::<f64>::zeros(rows, lines.ncols()));
+    for Line { mask, changes } in (0..SWEEPS).flat_map(|_| taken) {
         // A short record determines no more.
         let changes = (*changes).min(samples / SAMPLES_PER_CHANGE).max(1);
         let shapes = Mat::from_fn(rows, 2 * changes, |t, c| {
@@ -294,9 +289,54 @@ fn disturbance(residual: &Mat<f64>, rows: usize, lines: &[Line]) -> Mat<f64> {
             let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
             slow * if c % 2 == 0 { cos } else { sin }
         });
-        let line = &shapes * shapes.subrows(rows - samples, samples).qr().solve_lstsq(&left);
-        left -= line.subrows(rows - samples, samples);
-        all += line;
+        let mut transformed = Mat::<c64>::zeros(lines.nrows(), 2 * changes);
+        for (to, shape) in transformed.col_iter_mut().zip(shapes.col_iter()) {
+            let mut work: Vec<c64> = shape.iter().skip(rows - samples).map(|x| c64::new(*x, 0.0)).collect();
+            fft.process(&mut work);
+            to.iter_mut().zip(&work[1..]).for_each(|(to, x)| *to = *x);
+        }
+        // Row k is line k + 1.
+        let (middle, half) =
+            (mask.middle * *samples as f64 - 1.0, mask.half * *samples as f64 + AROUND * changes as f64);
+        let from = (middle - half).max(0.0) as usize;
+        let count = ((middle + half) as usize).min(lines.nrows() - 1) + 1 - from;
+        let part = |of: &Mat<c64>| {
+            Mat::from_fn(2 * count, of.ncols(), |r, c| {
+                let x = of[(from + r % count, c)];
+                if r < count { x.re } else { x.im }
+            })
+        };
+        let amplitudes = part(&transformed).qr().solve_lstsq(part(&left));
+        left -= &transformed * Mat::from_fn(2 * changes, left.ncols(), |i, j| c64::new(amplitudes[(i, j)], 0.0));
+        all += shapes * amplitudes;
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// A line of amplitude 1 between two lines of the transform, in the residual of a double integrator under a slow torque, which falls with
+    /// the third power of frequency: the error of the amplitudes is that of the noise at the line.
+    #[test]
+    fn a_drift_does_not_spoil_the_amplitude_of_a_line() {
+        let (samples, turns, size) = (4000, 67.5 / 4000.0, 0.05);
+        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let line = |t: usize| (TAU * turns * t as f64 + 0.4).cos();
+        let mut work: Vec<c64> = (0..samples).map(|t| c64::new(line(t), 0.0)).collect();
+        FftPlanner::new().plan_fft_forward(samples).process(&mut work);
+        let lines = Mat::from_fn(samples / 2, 1, |k, _| {
+            let size = size * (samples as f64 / 2.0).sqrt() * (67.5 / (k as f64 + 1.0)).powi(3);
+            work[k + 1] + c64::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * size
+        });
+        let taken = [Line { mask: Mask { middle: turns, half: 5.0 / samples as f64 }, changes: 1 }];
+        let found = disturbance(&Residual { lines, samples }, samples, &taken);
+        let error = (0..samples).map(|t| (found[(t, 0)] - line(t)).powi(2)).sum::<f64>() / samples as f64;
+        // Two amplitudes, each of variance 2 size^2 / N: mean square 2 size^2 / N.
+        assert!(error < 4.0 * 2.0 * size * size / samples as f64, "{error}");
+    }
 }

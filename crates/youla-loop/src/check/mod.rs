@@ -47,7 +47,7 @@ mod sequence;
 mod timing;
 
 pub use clipping::{Clipping, Limit, clipping};
-pub use controller::{Change, ControllerCheck, ControllerRecord, Declared, Parts, Reading, controller};
+pub use controller::{Change, ControllerCheck, ControllerRecord, Declared, GainPart, Parts, Reading, controller};
 pub use delay::{Delay, delay};
 pub use drift::{Drift, drift};
 pub use excitation::{ExcitationCheck, excitation};

@@ -40,6 +40,9 @@ pub fn parse_settings(text: &str, path: &Path) -> Result<RunSettings> {
 
 fn with_agreement(error: Error, text: &str, path: &Path) -> Error {
     let Error::File(youla_io::Error::Settings { path: file, at, problem }) = error else { return error };
+    if !problem.contains("`feedback`") {
+        return Error::File(youla_io::Error::Settings { path: file, at, problem });
+    }
     let shown = RunSettings::without_feedback(text).map_or("", |with| {
         let folder = path.parent().unwrap_or(Path::new(""));
         agreement(|sign| check_run(&with(sign)?, folder).ok())

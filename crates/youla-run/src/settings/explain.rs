@@ -143,8 +143,11 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
         return unknown(keys.split(", ").next().unwrap_or_default(), &known, place);
     }
     if message.starts_with("wanted exactly 1 element") {
-        let count = if message.contains("found 0") { "none" } else { "more than one" };
-        return format!("{} must hold exactly one of {}, but holds {count}", place.form(), forms_at(place));
+        let found = if message.contains("found 0") { "none" } else { "more keys" };
+        let forms = forms_at(place);
+        let key = "a key of one of them belongs into its table, such as `feedback` into [controller.pid]";
+        let mend = if place.table.starts_with("controller") { format!("; {key}") } else { String::new() };
+        return format!("{} must hold exactly one of {forms}, but holds {found}{mend}", place.form());
     }
     if let Some(must) = message.strip_prefix("wanted ").or_else(|| message.strip_prefix("expected ")) {
         return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must));

@@ -25,7 +25,7 @@ impl Default for LoopGain {
 }
 
 impl LoopGain {
-    fn of(&self, place: usize) -> f64 {
+    pub(super) fn of(&self, place: usize) -> f64 {
         match self {
             LoopGain::One(value) => *value,
             LoopGain::Each(values) => values.get(place).copied().unwrap_or(f64::NAN),
@@ -89,6 +89,12 @@ pub struct IdealPid {
 }
 
 impl ParallelPid {
+    /// Loops for which it states gains of their own.
+    pub(super) fn loops(&self) -> Option<usize> {
+        let Self { kp, ki, kd, derivative_filter, .. } = self;
+        [kp, ki, kd, derivative_filter].iter().find_map(|gain| gain.loops())
+    }
+
     pub(super) fn parts(&self) -> PidLoops {
         let Self { discretisation, kp, ki, kd, derivative_filter: filter, .. } = self;
         PidLoops::new([("kp", kp), ("ki", ki), ("kd", kd), ("derivative_filter", filter)], |[kp, ki, kd, filter]| Pid {

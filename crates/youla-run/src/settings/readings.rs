@@ -5,7 +5,7 @@ use super::models::Polynomials;
 use super::pid::{IdealPid, LoopGain, ParallelPid};
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::check::Reading;
+use youla_loop::check::{GainPart, Reading};
 use youla_loop::redesign::structured::Discretisation;
 
 /// The true sample time over the stated one, where times were written in another unit.
@@ -14,6 +14,9 @@ const CLOCKS: [(f64, &str); 3] = [
     (1e-6, "the time of the log is in microseconds"),
     (1e3, "the stated one is a thousandth of it"),
 ];
+
+/// Delays of a PID that are tried, samples.
+const LONGEST_DELAY: usize = 3;
 
 impl ControllerSettings {
     /// Other controllers with the same numbers, positive feedback.
@@ -44,6 +47,24 @@ impl ControllerSettings {
         all
     }
 
+    /// The parts of a PID with a gain of one each, positive feedback.
+    pub(crate) fn gain_parts(&self, time: Discrete, folder: &Path) -> Vec<GainPart> {
+        let Self::Pid(pid) = self else { return Vec::new() };
+        let loops = pid.loops();
+        let of = |(gain, place): (usize, usize)| {
+            let unit = |k: usize| {
+                let of = |loops: usize| (0..loops).map(|l| f64::from(u8::from(k == gain && l == place))).collect();
+                loops.map_or(LoopGain::One(f64::from(u8::from(k == gain))), |loops| LoopGain::Each(of(loops)))
+            };
+            let part = Self::Pid(ParallelPid { kp: unit(0), ki: unit(1), kd: unit(2), ..pid.clone() });
+            let (key, value) = [("kp", &pid.kp), ("ki", &pid.ki), ("kd", &pid.kd)][gain];
+            let key = if loops.is_some() { format!("{key} of loop {}", place + 1) } else { key.to_owned() };
+            let controller = part.realise(time, None, folder).ok()?.system().clone();
+            Some(GainPart { key, value: value.of(place), controller })
+        };
+        (0..3).flat_map(|gain| (0..loops.unwrap_or(1)).map(move |place| (gain, place))).filter_map(of).collect()
+    }
+
     /// Whether it is stated with times or in s.
     fn depends_on_time(&self) -> bool {
         match self {
@@ -67,7 +88,20 @@ impl ControllerSettings {
                     delay: pid.delay,
                 };
                 let form = "[controller.ideal_pid], ki as ti and kd as td".to_owned();
-                vec![self.under_other_rule(pid.discretisation), (form, Self::IdealPid(ideal))]
+                let mut all = vec![self.under_other_rule(pid.discretisation), (form, Self::IdealPid(ideal))];
+                all.extend((0..=LONGEST_DELAY).filter(|delay| *delay != pid.delay).map(|delay| {
+                    (format!("delay = {delay}"), Self::Pid(ParallelPid { delay, ..pid.clone() }))
+                }));
+                if let LoopGain::One(filter) = pid.derivative_filter
+                    && filter > 0.0
+                {
+                    all.extend([1e-3 * filter, 1e3 * filter, 1.0 / filter].map(|filter| {
+                        let derivative_filter = LoopGain::One(filter);
+                        let words = format!("derivative_filter = {filter}");
+                        (words, Self::Pid(ParallelPid { derivative_filter, ..pid.clone() }))
+                    }));
+                }
+                all
             }
             Self::IdealPid(pid) => {
                 let parallel = ParallelPid {

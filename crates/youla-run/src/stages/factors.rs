@@ -9,7 +9,7 @@ use youla::control::{ChannelScales, RunningController, closed_loop, with_input_p
 use youla::factor::{CoprimeFactors, loop_factors};
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::check::{Declared, Reading};
+use youla_loop::check::{Declared, GainPart, Reading};
 
 /// Nominal model and controller as run.toml declares them.
 #[derive(Debug, Clone)]
@@ -20,6 +20,8 @@ pub struct DeclaredLoop {
     pub running: RunningController,
     /// What its numbers may mean where the log contradicts it.
     readings: Vec<Reading>,
+    /// Its parts with a gain each.
+    parts: Vec<GainPart>,
 }
 
 impl DeclaredLoop {
@@ -28,12 +30,13 @@ impl DeclaredLoop {
         let nominal = settings.nominal.as_ref().map(|nominal| nominal.realise(folder, time)).transpose()?;
         let running = settings.controller.realise(time, nominal.as_ref(), folder)?;
         let readings = settings.controller.readings(time, nominal.as_ref(), folder);
-        Ok(DeclaredLoop { nominal, running, readings })
+        let parts = settings.controller.gain_parts(time, folder);
+        Ok(DeclaredLoop { nominal, running, readings, parts })
     }
 
     /// The controller as the check of the data takes it.
     pub(crate) fn stated(&self) -> Declared<'_> {
-        Declared { controller: self.controller(), readings: &self.readings }
+        Declared { controller: self.controller(), readings: &self.readings, parts: &self.parts }
     }
 
     /// The controller that ran, `u = K y` (positive feedback).

@@ -1,6 +1,7 @@
 //! The part of the logged input that the controller does not explain, as declared and with one change.
 
-use super::{Change, ControllerRecord};
+use super::gains::gains;
+use super::{Change, ControllerRecord, GainPart};
 use crate::error::Result;
 use youla::Mat;
 use youla::linalg::{block, eye, least_squares};
@@ -8,7 +9,7 @@ use youla::lti::{Discrete, StateSpace, simulate_best};
 
 /// Signals of the controller: `w = K e`.
 pub(super) struct Log<'a> {
-    record: ControllerRecord<'a>,
+    pub(super) record: ControllerRecord<'a>,
     pub(super) e: Mat<f64>,
     pub(super) w: Mat<f64>,
 }
@@ -24,8 +25,8 @@ impl<'a> Log<'a> {
         Ok(relative(&(w - simulate_best(&with_constant(k)?, e.as_ref(), w.as_ref())?), w))
     }
 
-    /// Every change with the residual that it leaves.
-    pub(super) fn changes(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
+    /// Every change with the residual that it leaves; `parts` are those of the controller with a gain each.
+    pub(super) fn changes(&self, k: &StateSpace<Discrete>, parts: &[GainPart]) -> Result<Vec<(Change, f64)>> {
         let mut all = vec![(Change::Sign, self.residual(&k.negated(), &self.e, &self.w)?)];
         let d = self.record.input_excitation;
         let other = d.map_or_else(|| -1.0 * self.record.u, |d| -1.0 * self.record.u - d);
@@ -58,7 +59,7 @@ impl<'a> Log<'a> {
             all.push((Change::ExcitationSign, self.residual(k, &self.e, &(self.record.u + d))?));
         }
         all.extend(self.places_of_excitation(k)?);
-        all.extend(self.gains(k)?);
+        all.extend(gains(self, k, parts)?);
         let p = self.e.ncols();
         for (i, j) in (0..p).flat_map(|i| (i + 1..p).map(move |j| (i, j))) {
             let place = |c: usize| {
@@ -108,47 +109,6 @@ impl<'a> Log<'a> {
             least = least.min(1.0 - rest.squared_norm_l2() / target.squared_norm_l2().max(f64::MIN_POSITIVE));
         }
         Ok(least)
-    }
-
-    /// One factor for all channels of e, and one for each alone, by least squares.
-    fn gains(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
-        let (n, m, p) = (self.e.nrows(), self.w.ncols(), self.e.ncols());
-        let mut parts = Vec::new();
-        for channel in 0..p {
-            let alone = Mat::from_fn(n, p, |t, c| if c == channel { self.e[(t, c)] } else { 0.0 });
-            parts.push(centred(&youla::lti::simulate(k, alone.as_ref(), &vec![0.0; k.order()])?));
-        }
-        let w = centred(&self.w);
-        // The start, where the state is not known, does not count.
-        let from = n / 20;
-        let stacked = |x: &Mat<f64>| {
-            let rows = n - from;
-            Mat::from_fn(rows * m, 1, |t, _| x[(from + t % rows, t / rows)])
-        };
-        let target = stacked(&w);
-        let sum = parts.iter().fold(Mat::zeros(n, m), |sum, part| sum + part);
-        let mut all = Vec::new();
-        let mut one = |change: &dyn Fn(f64) -> Change, regressor: &Mat<f64>, target: &Mat<f64>| -> Result<()> {
-            let found = least_squares("the gain of the controller", regressor.as_ref(), target.as_ref())?;
-            let left = target - regressor * &found.x;
-            all.push((change(found.x[(0, 0)]), left.norm_l2() / stacked(&w).norm_l2()));
-            Ok(())
-        };
-        one(&Change::Gain, &stacked(&sum), &target)?;
-        // A channel in another unit is a factor on what was measured; the reference keeps its unit.
-        for (channel, part) in parts.iter().enumerate() {
-            let measured = match self.record.reference {
-                Some(_) => {
-                    let alone = Mat::from_fn(n, p, |t, c| if c == channel { self.record.y[(t, c)] } else { 0.0 });
-                    centred(&youla::lti::simulate(k, alone.as_ref(), &vec![0.0; k.order()])?)
-                }
-                None if p > 1 => part.clone(),
-                None => continue,
-            };
-            let others = stacked(&(&sum - &measured));
-            one(&|gain| Change::ChannelGain(channel, gain), &stacked(&measured), &(&target - others))?;
-        }
-        Ok(all)
     }
 
     fn saturation(&self, k: &StateSpace<Discrete>) -> Result<Option<(Change, f64)>> {

@@ -5,13 +5,14 @@
 //! ```text
 //! residual = |w - K e| / |w|     (about their means)
 //! ```
-//! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel of e
-//! by least squares, two channels or inputs and outputs exchanged, the input limited to its own range, d left out or with the other sign. A change
+//! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel or on
+//! one gain of the controller by least squares, two channels or inputs and outputs exchanged, the input limited to its own range, d left out or with the other sign. A change
 //! is proposed where it brings the residual below a tenth of what it was and below `controller_caution` twice over, or to nearly nothing.
 //! Then other readings of the numbers of the controller are tried ([`Reading`]): another rule of discretisation, another form, another clock.
 //! Where none is, the law is compared part by part ([`Parts`]): a controller that was switched or is scheduled.
 //! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
 
+mod gains;
 mod log;
 mod messages;
 mod parts;
@@ -46,6 +47,14 @@ pub enum Change {
     Gain(f64),
     /// A factor on one measured output, counted from 0, and not on its reference.
     ChannelGain(usize, f64),
+    /// A factor on one reference.
+    ReferenceGain(usize, f64),
+    /// A factor on one logged input.
+    InputGain(usize, f64),
+    /// A factor on one excitation.
+    ExcitationGain(usize, f64),
+    /// Another value of one gain of the controller, with its key.
+    Part(String, f64),
     /// Two outputs exchanged.
     Exchanged(usize, usize),
     /// The input limited to the range that it has in the log.
@@ -71,6 +80,17 @@ pub struct Reading {
     pub controller: StateSpace<Discrete>,
 }
 
+/// A part of a controller with a gain of its own.
+#[derive(Debug, Clone)]
+pub struct GainPart {
+    /// The key of the gain.
+    pub key: String,
+    /// Its stated value.
+    pub value: f64,
+    /// The part with a gain of one, positive feedback.
+    pub controller: StateSpace<Discrete>,
+}
+
 /// A controller as it is stated.
 #[derive(Debug, Clone, Copy)]
 pub struct Declared<'a> {
@@ -78,11 +98,13 @@ pub struct Declared<'a> {
     pub controller: &'a StateSpace<Discrete>,
     /// What its numbers may mean beside it.
     pub readings: &'a [Reading],
+    /// Its parts with a gain each, where it has such.
+    pub parts: &'a [GainPart],
 }
 
 impl<'a> From<&'a StateSpace<Discrete>> for Declared<'a> {
     fn from(controller: &'a StateSpace<Discrete>) -> Self {
-        Declared { controller, readings: &[] }
+        Declared { controller, readings: &[], parts: &[] }
     }
 }
 
@@ -149,7 +171,7 @@ pub fn controller<'a>(
     record: ControllerRecord<'_>,
     options: &CheckOptions,
 ) -> Result<ControllerCheck> {
-    let Declared { controller: k, readings } = declared.into();
+    let Declared { controller: k, readings, parts: of_gain } = declared.into();
     let log = Log::new(record);
     let excited = record.input_excitation.is_some();
     let moves = |r: MatRef<'_, f64>| r.col_iter().any(|c| c.iter().any(|v| *v != c[0]));
@@ -162,7 +184,7 @@ pub fn controller<'a>(
     let residual = log.residual(k, &log.e, &log.w)?;
     let mut change = None;
     if residual > options.controller_caution {
-        for (candidate, left) in log.changes(k)? {
+        for (candidate, left) in log.changes(k, of_gain)? {
             // The simpler changes come first.
             if change.as_ref().is_none_or(|(_, best)| left < CLEARER * best) {
                 change = Some((candidate, left));

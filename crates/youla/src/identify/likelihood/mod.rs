@@ -134,7 +134,7 @@ pub fn recommend(
     let (mut recommended, doubts) = on.judged(&found, 1.0)?;
     if let Some((unseen, widening)) = on.without_unseen(&found, &recommended, &doubts, &mut candidates) {
         let (without, _) = on.judged(&unseen.found, widening)?;
-        if without.failures() < recommended.failures() {
+        if without.failures() < recommended.failures() && !without.is_contradicted_beside(&recommended) {
             recommended = without;
             recommended.evidence.push(unseen.evidence(time.ts()));
         }

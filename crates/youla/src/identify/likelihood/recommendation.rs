@@ -40,6 +40,12 @@ impl Recommendation {
         self.evidence.iter().all(Evidence::holds)
     }
 
+    /// Whether the excitation contradicts it where it does not contradict another model of the same records as much.
+    pub(super) fn is_contradicted_beside(&self, other: &Self) -> bool {
+        let shown = |of: &Self| of.evidence.iter().find(|e| e.question.ends_with("(indirect response)"))?.significance;
+        shown(self).is_some_and(|here| here > BEYOND_CHANCE && here > 2.0 * shown(other).unwrap_or(0.0))
+    }
+
     /// How many required tests are not passed.
     pub(super) fn failures(&self) -> usize {
         self.evidence.iter().filter(|e| !e.holds()).count()

@@ -71,15 +71,37 @@ impl Excess {
     /// bands around a low frequency a response falls by decades, and its errors with it. Bands in which the unit is less than half are left
     /// out.
     pub(crate) fn near_in_units(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> (Vec<f64>, f64) {
-        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).iter().map(|b| (b, b.units(squares))).collect();
-        let (mut out, mut largest) = (squares(share), 0.0_f64);
-        for (i, value) in out.iter_mut().enumerate() {
-            let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * *value);
-            let (excess, deviations) = beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY))));
+        let mut largest = 0.0_f64;
+        let of = |(square, Mean { excess, deviations, .. }): (f64, Mean)| {
             largest = largest.max(deviations);
-            *value *= if deviations > self.least { excess.max(0.0) } else { 0.0 };
+            square * if deviations > self.least { excess.max(0.0) } else { 0.0 }
+        };
+        (self.means(share, squares).map(of).collect(), largest)
+    }
+
+    /// Mean square of each entry near a frequency with what chance explains of it, in units of which `squares` gives the squares: what the error
+    /// may be where the bands are all that is known of it.
+    pub(crate) fn with_chance(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> Vec<f64> {
+        self.means(share, squares).map(|(square, mean)| square * (mean.excess.max(0.0) + mean.chance)).collect()
+    }
+
+    /// Whether the bands show an error of each entry of more than its unit at any frequency, by so many deviations.
+    pub(crate) fn exceeds(&self, squares: &dyn Fn(f64) -> Vec<f64>, deviations: f64) -> Vec<bool> {
+        let mut out = vec![false; self.bands.first().map_or(0, |band| band.squares.len())];
+        for band in &self.bands {
+            let means = self.means(band.share, squares);
+            out.iter_mut().zip(means).for_each(|(o, (_, mean))| *o |= mean.excess > 1.0 && mean.deviations > deviations);
         }
-        (out, largest)
+        out
+    }
+
+    /// The square of the unit of each entry at a frequency with the means of its bands in that unit.
+    fn means(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> impl Iterator<Item = (f64, Mean)> {
+        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).iter().map(|b| (b, b.units(squares))).collect();
+        squares(share).into_iter().enumerate().map(move |(i, square)| {
+            let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * square);
+            (square, beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY)))))
+        })
     }
 
     /// The bands around a frequency; none where the nearest is farther away than the window is wide.
@@ -95,12 +117,21 @@ impl Excess {
     }
 }
 
-/// Mean square of an entry over some bands less its mean by chance, with the squares of their units, and by how many standard deviations of a
-/// normal variable the mean square exceeds chance.
+/// A mean square over some bands.
+struct Mean {
+    /// Less its mean by chance.
+    excess: f64,
+    /// Its mean by chance.
+    chance: f64,
+    /// Standard deviations of a normal variable by which the mean square exceeds chance.
+    deviations: f64,
+}
+
+/// Mean square of an entry over some bands with the squares of their units.
 ///
 /// The bands count with the inverse variances `w = freedom / chance^2` of their mean squares. By chance the sum of these is nearly
 /// chi-square with `2 (sum w chance)^2 / sum w` degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110).
-fn beyond_chance<'a>(bands: impl Iterator<Item = (&'a ExcessBand, usize, f64)>) -> (f64, f64) {
+fn beyond_chance<'a>(bands: impl Iterator<Item = (&'a ExcessBand, usize, f64)>) -> Mean {
     let (mut excess, mut chance, mut weights) = (0.0, 0.0, 0.0);
     for (band, entry, unit) in bands {
         let by_chance = band.chance[entry] / unit;
@@ -110,8 +141,9 @@ fn beyond_chance<'a>(bands: impl Iterator<Item = (&'a ExcessBand, usize, f64)>) 
         weights += weight;
     }
     if weights == 0.0 {
-        return (0.0, 0.0);
+        return Mean { excess: 0.0, chance: 0.0, deviations: 0.0 };
     }
     let degrees = 2.0 * chance * chance / weights;
-    (excess / weights, chi_square_deviations(degrees * (1.0 + excess / chance), degrees))
+    let deviations = chi_square_deviations(degrees * (1.0 + excess / chance), degrees);
+    Mean { excess: excess / weights, chance: chance / weights, deviations }
 }

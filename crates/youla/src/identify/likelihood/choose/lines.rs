@@ -38,6 +38,10 @@ const SIDEBAND: f64 = 0.6;
 const SAMPLES_PER_CHANGE: usize = 8;
 /// Lines beside the band that does not count from which the amplitudes are estimated, for each slow change: ten equations for each unknown.
 const AROUND: f64 = 5.0;
+/// Half bands within which sidebands are sought, sizes that are tried, each twice the last, and the gain of the likelihood that shows them.
+const SKIRT_REACH: f64 = 20.0;
+const SKIRTS: i32 = 6;
+const SKIRT_NATS: f64 = 5.0;
 /// Sweeps over the disturbances, which are nearly orthogonal.
 const SWEEPS: usize = 2;
 
@@ -184,6 +188,18 @@ fn less_lines(
         let task = Task { spectra: spectra.clone(), start: less, delays: delays.clone(), origin };
         let less = problem.run(vec![task], f64::INFINITY, table);
         if less.first()?.criterion < whole {
+            let lines = with_sidebands(&next.lines, &problem, less.first()?);
+            if lines.iter().any(|line| line.mask.skirt > 0.0) {
+                let problem = Problem { masked: lines.iter().map(|line| line.mask).collect(), ..problem };
+                let spectra = Arc::new(problem.spectra(delays));
+                let model = less.first()?.found.point.model.clone();
+                let start = with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
+                let task = Task { spectra, start, delays: delays.clone(), origin: "with the sidebands of a line".into() };
+                let weighed = problem.run(vec![task], f64::INFINITY, table);
+                let solution = problem.solve_from(weighed, table)?;
+                (next.solution, next.lines) = (solution, lines);
+                return Some(next);
+            }
             next.solution = problem.solve_from(less, table)?;
             return Some(next);
         }
@@ -199,7 +215,7 @@ fn beside(lines: &mut Vec<Line>, middle: f64, (changes, half): (usize, f64)) {
             line.mask.half = (apart + half).max(2.0 * line.mask.half);
             line.changes = line.changes.max(changes);
         }
-        None => lines.push(Line { mask: Mask { middle, half }, changes }),
+        None => lines.push(Line { mask: Mask { middle, half, skirt: 0.0 }, changes }),
     }
 }
 
@@ -256,7 +272,8 @@ impl Narrow {
         }
         let kept = |t: &Vec<f64>| (0..t.len()).filter(|i| !left_out.contains(i)).map(|i| t[i]).collect();
         let point = Point { model: self.model.without(&self.places), ends: whole.ends.iter().map(kept).collect() };
-        let mut residuals = point.residuals(&clean.spectra_of(records, &choice.delays)).into_iter();
+        let bare = Problem { masked: Vec::new(), ..clean.clone() };
+        let mut residuals = point.residuals(&bare.spectra_of(records, &choice.delays)).into_iter();
         let of = |e: &Experiment<'_>| {
             let rows = e.y.nrows();
             let v = long_enough(rows, clean.skip).then(|| residuals.next()).flatten()?;
@@ -267,6 +284,52 @@ impl Narrow {
         };
         records.iter().map(of).collect()
     }
+}
+
+/// Lines with the sidebands that are in what a model of the records without them leaves.
+fn with_sidebands(lines: &[Line], problem: &Problem<'_>, choice: &Choice) -> Vec<Line> {
+    let bare = Problem { masked: Vec::new(), ..problem.clone() };
+    let spectra = bare.spectra(&choice.delays);
+    let residuals = choice.found.point.residuals(&spectra);
+    let of = |line: &Line| {
+            let skirt= skirt(&residuals, &spectra, &line.mask);
+            if std::env::var("DBG").is_ok() { eprintln!("{:?} {}", line, spectra.records[0].samples as f64 * skirt); }
+            Line { mask: Mask { skirt, ..line.mask }, ..*line }
+    };
+    lines.iter().map(of).collect()
+}
+
+/// Distance from a line of a disturbance at which its sidebands have the power of the noise, of the output where it is the largest, by
+/// Whittle's likelihood of the lines beside the band that does not count; 0 where they are not told from none.
+fn skirt(residuals: &[Vec<c64>], spectra: &Spectra, mask: &Mask) -> f64 {
+    let reach = (SKIRT_REACH * mask.half).min(WIDEST * mask.middle);
+    let p = spectra.outputs;
+    let of = |i: usize| {
+        let mut beside: Vec<(f64, f64)> = Vec::new();
+        for (v, lines) in residuals.iter().zip(&spectra.records) {
+            let place = |turns: f64| (turns * lines.samples as f64).clamp(1.0, lines.z.len() as f64) as usize - 1;
+            for k in place(mask.middle - reach)..place(mask.middle + reach) {
+                let turns = (k + 1) as f64 / lines.samples as f64;
+                if (turns - mask.middle).abs() > mask.half {
+                    beside.push((turns, v[k * p + i].norm_sqr()));
+                }
+            }
+        }
+        let cost = |skirt: f64| {
+            let mask = Mask { skirt, ..*mask };
+            let (mut level, mut logs) = (0.0, 0.0);
+            for (turns, power) in &beside {
+                level += power / mask.power(*turns);
+                logs += mask.power(*turns).ln();
+            }
+            beside.len() as f64 * (level / beside.len().max(1) as f64).ln() + logs
+        };
+        let none = cost(0.0);
+        let best = (0..SKIRTS).map(|j| 0.5 * mask.half * f64::from(j).exp2()).map(|s| (cost(s), s));
+        let (least, found) = best.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((none, 0.0));
+        if least < none - SKIRT_NATS { found } else { 0.0 }
+    };
+    (0..p).map(of).fold(0.0, f64::max)
 }
 
 /// The transform of the residual of the last samples of a record: lines from the first x channels.
@@ -333,7 +396,7 @@ mod tests {
             let size = size * (samples as f64 / 2.0).sqrt() * (67.5 / (k as f64 + 1.0)).powi(3);
             work[k + 1] + c64::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * size
         });
-        let taken = [Line { mask: Mask { middle: turns, half: 5.0 / samples as f64 }, changes: 1 }];
+        let taken = [Line { mask: Mask { middle: turns, half: 5.0 / samples as f64, skirt: 0.0 }, changes: 1 }];
         let found = disturbance(&Residual { lines, samples }, samples, &taken);
         let error = (0..samples).map(|t| (found[(t, 0)] - line(t)).powi(2)).sum::<f64>() / samples as f64;
         // Two amplitudes, each of variance 2 size^2 / N: mean square 2 size^2 / N.

@@ -21,13 +21,22 @@ const PART: usize = 8192;
 /// Least lines on each side of a disturbance that do not count: those into which it leaks where its amplitude is not that of a whole record.
 const LEAST_MASKED: f64 = 3.0;
 
-/// A band around a disturbance whose lines do not count.
+/// A band around a disturbance whose lines do not count, and the sidebands of the disturbance beside it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mask {
     /// Its middle, share of the sample rate.
     pub(crate) middle: f64,
     /// Half of its width.
     pub(crate) half: f64,
+    /// Distance from the middle at which the sidebands have the power of the noise; 0 where there are none.
+    pub(crate) skirt: f64,
+}
+
+impl Mask {
+    /// Power of noise and sidebands over that of the noise. A phase that walks at random has sidebands that fall with the square of the distance.
+    pub(crate) fn power(&self, turns: f64) -> f64 {
+        1.0 + (self.skirt / (turns - self.middle)).powi(2)
+    }
 }
 
 /// The parts of a record of so many lines.
@@ -141,10 +150,18 @@ impl Spectra {
         Spectra { inputs: m, outputs: p, held: true, records: records.collect() }
     }
 
-    /// Without the lines in some bands.
+    /// Without the lines in some bands, and with lines beside them that are divided by what the sidebands add to their noise.
     pub(crate) fn masked(mut self, masks: &[Mask]) -> Self {
+        let (m, p) = (self.inputs, self.outputs);
         for lines in &mut self.records {
             let samples = lines.samples as f64;
+            for k in 0..if masks.iter().any(|mask| mask.skirt > 0.0) { lines.z.len() } else { 0 } {
+                let power: f64 = masks.iter().map(|mask| mask.power((k + 1) as f64 / samples) - 1.0).sum();
+                let scale = 1.0 / (1.0 + power).sqrt();
+                lines.u[k * m..(k + 1) * m].iter_mut().for_each(|u| *u *= scale);
+                lines.y[k * p..(k + 1) * p].iter_mut().for_each(|y| *y *= scale);
+                lines.ends[k] *= scale;
+            }
             for mask in masks {
                 let (at, half) = (mask.middle * samples, (mask.half * samples).max(LEAST_MASKED));
                 // The first line is that above zero.

@@ -23,6 +23,7 @@ use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
+use crate::identify::verdict::limits::{BEYOND_CHANCE, LARGEST_IN_BAND};
 use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
@@ -87,6 +88,9 @@ pub(crate) struct Directions {
     scatter: f64,
     /// The errors that the excitation shows: distortion, differences between groups of records, and between records and fresh ones.
     seen: Option<[Excess; 3]>,
+    /// Whether the excitation shows that an entry has another form than the model, by an error beyond that of a band of validity: then no more is
+    /// known of the entry anywhere than the excitation shows.
+    of_another_form: Vec<bool>,
     /// What acts at an input and is no linear function of it.
     nonlinear_part: Option<NonlinearPart>,
     /// The outputs that were interpolated.
@@ -129,7 +133,7 @@ impl Directions {
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);
         let seen = witness.map(|w| [w.distortion, w.variation, w.against_fresh]);
-        Directions { seen, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
+        Directions { scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }.with_seen(seen)
     }
 
     /// A model with its delays, the roots of the covariance of its parameters, and rivals with their criteria.
@@ -154,6 +158,7 @@ impl Directions {
             rivals,
             scatter: 1.0,
             seen: None,
+            of_another_form: Vec::new(),
             nonlinear_part: None,
             interpolated: Vec::new(),
         }
@@ -162,6 +167,14 @@ impl Directions {
     /// The same with what acts at an input and is no linear function of it, and with the outputs that were interpolated.
     pub(crate) fn with(self, nonlinear_part: Option<NonlinearPart>, interpolated: Vec<Interpolated>) -> Self {
         Directions { nonlinear_part, interpolated, ..self }
+    }
+
+    /// The same with the errors that the excitation shows.
+    pub(super) fn with_seen(self, seen: Option<[Excess; 3]>) -> Self {
+        let of_band = |share: f64| self.powers(share).iter().map(|g| LARGEST_IN_BAND * LARGEST_IN_BAND * g).collect();
+        let exceeds = |[distortion, ..]: &[Excess; 3]| distortion.exceeds(&of_band, BEYOND_CHANCE);
+        let of_another_form = seen.as_ref().map(exceeds).unwrap_or_default();
+        Directions { seen, of_another_form, ..self }
     }
 
     /// Independent errors of the parameters.
@@ -216,6 +229,11 @@ impl Directions {
         }
     }
 
+    /// Squares of the magnitudes of the entries of the response.
+    fn powers(&self, share: f64) -> Vec<f64> {
+        delayed(&self.model, &self.delays, share).iter().map(|g| g.norm_sqr()).collect()
+    }
+
     fn columns(&self, share: f64) -> Columns {
         let z = c64::cis(std::f64::consts::TAU * share);
         let (entries, m) = (self.model.inputs * self.model.outputs, self.model.inputs);
@@ -231,7 +249,12 @@ impl Directions {
         let mut distortion = near(0).map_or_else(|| vec![0.0; entries], |(_, squares)| squares);
         // Differences between records are alike from band to band as they are, or relative to the response, which falls by decades at low
         // frequencies and turns at a resonance.
-        let powers = |share: f64| delayed(&self.model, &self.delays, share).iter().map(|g| g.norm_sqr()).collect();
+        let powers = |share: f64| self.powers(share);
+        if self.of_another_form.contains(&true) {
+            let known = self.seen.as_ref().map_or_else(Vec::new, |[seen, ..]| seen.with_chance(share, &powers));
+            let of_form = distortion.iter_mut().zip(known).zip(&self.of_another_form).filter(|(_, other)| **other);
+            of_form.for_each(|((distortion, known), _)| *distortion = distortion.max(known));
+        }
         let mut variation = vec![0.0_f64; entries];
         for (excess, plain) in [1, 2].into_iter().filter_map(near) {
             let relative = excess.near_in_units(share, &powers).0;

@@ -129,10 +129,12 @@ impl TryFrom<StoredRegion> for Region {
             root,
             rivals: stored.rivals,
             scatter: stored.scatter,
-            seen: stored.seen,
+            seen: None,
+            of_another_form: Vec::new(),
             nonlinear_part: stored.nonlinear_part,
             interpolated: stored.interpolated,
         };
+        let directions = directions.with_seen(stored.seen);
         Ok(Region::new(stored.sizes, time, &stored.shares, directions))
     }
 }

@@ -278,10 +278,12 @@ fn hold_problem(domain: Option<Domain>, hold: Option<Hold>) -> Option<String> {
 }
 
 fn held(system: &StateSpace<Continuous>, hold: Hold, time: Discrete) -> Result<StateSpace<Discrete>> {
-    Ok(match hold {
+    let system = match hold {
         Hold::Zoh => system.zoh(time)?,
         Hold::Tustin => system.tustin(time)?,
-    })
+    };
+    // Coefficients in s give states that differ by powers of the sample rate; nobody knows these states.
+    Ok(system.balanced()?)
 }
 
 /// Longest dead time: each sample is a state per input. Chosen, not measured.

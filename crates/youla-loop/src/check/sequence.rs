@@ -76,6 +76,10 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize) -> Re
         let equation = Equation { lagged, fit: &fit, input, outputs: [m, p], sigma };
         for first in starts {
             let at = first + lagged.lags;
+            // Where the equation has not held before, nothing says that it broke.
+            if first < lagged.lags {
+                continue;
+            }
             // Where an excitation begins, directions are excited that the regression could not tell before.
             if (m + p..m + p + known).any(|s| begins(lagged, s, at)) {
                 continue;

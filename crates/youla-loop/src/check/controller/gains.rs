@@ -89,3 +89,77 @@ pub(super) fn gains(log: &Log<'_>, k: &StateSpace<Discrete>, parts: &[GainPart])
     }
     Ok(all)
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::check::{Change, CheckOptions, ControllerRecord, Declared, GainPart, controller};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use youla::Mat;
+    use youla::lti::{Discrete, StateSpace};
+
+    const ROWS: usize = 3000;
+
+    fn number(value: f64) -> Mat<f64> {
+        Mat::from_fn(1, 1, |_, _| value)
+    }
+
+    /// `u = -(kp e + ki integral of e)`, positive feedback.
+    fn pi(kp: f64, ki: f64) -> StateSpace<Discrete> {
+        let time = Discrete::new(1e-3).unwrap();
+        StateSpace::new(number(1.0), number(0.02), number(-ki), number(-kp), time).unwrap()
+    }
+
+    /// The change that explains a log of the PI controller 1.5, 2 whose u, y, d and r are multiplied by some factors, `stated` being declared.
+    fn change(stated: [f64; 2], [of_u, of_y, of_d, of_r]: [f64; 4]) -> Change {
+        let rng = &mut ChaCha8Rng::seed_from_u64(7);
+        let (mut x, mut integral, mut reference) = (0.0, 0.0, 0.3);
+        let rows: Vec<[f64; 4]> = (0..ROWS)
+            .map(|t| {
+                if t % 150 == 0 {
+                    reference = rng.sample(StandardNormal);
+                }
+                let d: f64 = rng.sample(StandardNormal);
+                let y: f64 = x + 0.05 * rng.sample::<f64, _>(StandardNormal);
+                let e = y - reference;
+                let u = d - 1.5 * e - 2.0 * integral;
+                integral += 0.02 * e;
+                x = 0.95 * x + 0.1 * u;
+                [of_u * u, of_y * y, of_d * d, of_r * reference]
+            })
+            .collect();
+        let [u, y, d, r] = [0, 1, 2, 3].map(|j| Mat::from_fn(ROWS, 1, |t, _| rows[t][j]));
+        let record = ControllerRecord {
+            u: u.as_ref(),
+            y: y.as_ref(),
+            input_excitation: Some(d.as_ref()),
+            reference: Some(r.as_ref()),
+        };
+        let part = |key: &str, value: f64, gains: [f64; 2]| GainPart {
+            key: key.into(),
+            value,
+            controller: pi(gains[0], gains[1]),
+        };
+        let parts = [part("kp", stated[0], [1.0, 0.0]), part("ki", stated[1], [0.0, 1.0])];
+        let k = pi(stated[0], stated[1]);
+        let declared = Declared { controller: &k, readings: &[], parts: &parts };
+        let (change, left) = controller(declared, record, &CheckOptions::default()).unwrap().change.unwrap();
+        assert!(left < 1e-9, "{change:?} {left}");
+        change
+    }
+
+    /// Planted behind an integrator: each wrong factor and each wrong gain is found with its size.
+    #[test]
+    fn wrong_factors_and_gains_are_found_behind_an_integrator() {
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-6;
+        let right = [1.5, 2.0];
+        assert!(matches!(change([3.0, 4.0], [1.0; 4]), Change::Gain(g) if near(g, 0.5)));
+        assert!(matches!(change([1.5, 20.0], [1.0; 4]), Change::Part(key, g) if key == "ki" && near(g, 2.0)));
+        assert!(matches!(change([1.2, 2.0], [1.0; 4]), Change::Part(key, g) if key == "kp" && near(g, 1.5)));
+        assert!(matches!(change(right, [1.0, 57.3, 1.0, 1.0]), Change::ChannelGain(0, g) if near(g, 1.0 / 57.3)));
+        assert!(matches!(change(right, [1.0, 1.0, 1.0, 57.3]), Change::ReferenceGain(0, g) if near(g, 1.0 / 57.3)));
+        assert!(matches!(change(right, [1e3, 1.0, 1.0, 1.0]), Change::InputGain(0, g) if near(g, 1e-3)));
+        assert!(matches!(change(right, [1.0, 1.0, 10.0, 1.0]), Change::ExcitationGain(0, g) if near(g, 0.1)));
+    }
+}

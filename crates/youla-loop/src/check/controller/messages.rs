@@ -43,7 +43,10 @@ impl Change {
             Change::InputSign => "the opposite sign of the input".into(),
             Change::ExchangedInputs(i, j) => format!("{} and {} exchanged", input(*i), input(*j)),
             Change::Trend => "a linear trend of the outputs added: one of them drifts in the log".into(),
-            Change::Shift(by) => format!("the outputs (and references) one sample {} against the input", rows(*by)),
+            Change::Shift(by) => {
+                let delay = if *by > 0 { "larger" } else { "smaller" };
+                format!("the outputs (and references) one sample {} against the input, or `delay` one sample {delay}", rows(*by))
+            }
             Change::InputShift(by) => {
                 format!("the input one sample {} against all other channels", rows(-*by))
             }

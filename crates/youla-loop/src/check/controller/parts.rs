@@ -83,6 +83,10 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
     let others: Vec<&Part> = (0..count).filter(inner).map(|i| &all[i]).collect();
     if longest.is_some_and(|longest| longest >= STRETCH) {
         let (held, broken): (Vec<_>, Vec<_>) = stretches.into_iter().partition(|s| holds[s.start]);
+        if broken.is_empty() {
+            let joints = joints(log, k, (0..count).map(|i| samples(i..i + 1)), caution)?;
+            return Ok((!joints.is_empty()).then_some(Parts::Interrupted(joints)));
+        }
         if broken.iter().any(|s| s.len() < STRETCH) || others.is_empty() {
             let most = holds.iter().filter(|holds| **holds).count() as f64 >= MOST * count as f64;
             return Ok(most.then(|| Parts::Interrupted(broken.into_iter().map(samples).collect())));
@@ -118,6 +122,24 @@ fn stretches(holds: &[bool]) -> Vec<Range<usize>> {
     let starts: Vec<usize> = (0..holds.len()).filter(|i| *i == 0 || holds[*i] != holds[i - 1]).collect();
     let end = |k: usize| starts.get(k + 1).copied().unwrap_or(holds.len());
     starts.iter().enumerate().map(|(k, start)| *start..end(k)).collect()
+}
+
+/// The samples around which the law, which holds in each part, does not go on from one part to the next: two logs one behind the other.
+fn joints(
+    log: &Log<'_>,
+    k: &StateSpace<Discrete>,
+    parts: impl Iterator<Item = Range<usize>>,
+    caution: f64,
+) -> Result<Vec<Range<usize>>> {
+    let parts: Vec<Range<usize>> = parts.collect();
+    let mut found = Vec::new();
+    for pair in parts.windows(2) {
+        if residual(log, k, &(pair[0].start..pair[1].end))? > caution {
+            let end = ends(log, k, pair[0].clone(), pair[1].len(), caution)?.end;
+            found.push(end.saturating_sub(1)..(end + 1).min(pair[1].end));
+        }
+    }
+    Ok(found)
 }
 
 fn residual(log: &Log<'_>, k: &StateSpace<Discrete>, at: &Range<usize>) -> Result<f64> {
@@ -177,7 +199,8 @@ impl Parts {
             ],
             Parts::Interrupted(at) => [
                 format!("the declared controller explains all of the record but rows {}", list(at)),
-                "Look there for a reset of the integrator, a command that was held, a limit, or wrong samples; leave the rows out by `segments` \
+                "Look there for a reset of the integrator, a command that was held, a limit, wrong samples, or the end of one log and the start of \
+                 another; leave the rows out by `segments` \
                  where the input is not the one that acted"
                     .to_owned(),
             ],

@@ -41,7 +41,7 @@ impl Region {
     ) -> PyResult<RegionOut<'py>> {
         let (model, hz) = (model_in(&model)?, hz.as_array().to_vec());
         let known = || region::Region::recommended(&model, &self.region, &hz);
-        Ok(py.detach(known)?.out(py))
+        Ok(worker::detached(py, known)?.out(py))
     }
 
     /// Standard deviation of a figure with these slopes in the entries of the response at a frequency.
@@ -117,7 +117,7 @@ pub(crate) fn write_files(
         }
         Ok(target.finish()?.display().to_string())
     };
-    Ok(py.detach(of)?)
+    worker::detached(py, of)
 }
 
 /// A new controller on a run that was kept: `models` are its plant and the model on which is designed.

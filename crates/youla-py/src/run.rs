@@ -112,7 +112,7 @@ impl Run {
     /// summary.json.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
         let of = || Ok::<_, Failure>(summary(&self.found, &self.seconds)?.to_string());
-        Ok(py.detach(of)?)
+        worker::detached(py, of)
     }
 
     /// The settings as run.toml.
@@ -147,7 +147,7 @@ impl Run {
     /// The response of a model with its region.
     fn response<'py>(&self, py: Python<'py>, key: &str, hz: PyReadonlyArray1<'py, f64>) -> PyResult<RegionOut<'py>> {
         let hz: Vec<f64> = hz.as_array().to_vec();
-        Ok(py.detach(|| self.region(key, &hz))?.out(py))
+        Ok(worker::detached(py, || self.region(key, &hz))?.out(py))
     }
 
     /// Standard deviation of a figure of the recommended model whose slopes in the entries of its response at a frequency are given.
@@ -185,7 +185,7 @@ impl Run {
 
     /// report.json.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(py.detach(|| Ok::<_, Failure>(serde_json::to_string(&self.report()?)?))?)
+        worker::detached(py, || Ok(serde_json::to_string(&self.report()?)?))
     }
 
     /// report.html.
@@ -195,7 +195,7 @@ impl Run {
             let written = serde_json::to_vec(&self.report()?)?;
             Ok::<_, Failure>(youla_report::html(&serde_json::from_slice(&written)?)?)
         };
-        Ok(py.detach(of)?)
+        worker::detached(py, of)
     }
 
     /// Writes the run folder that the program writes.
@@ -207,7 +207,7 @@ impl Run {
             let written = write_run(&self.found, &folder, replace, &mut clock)?;
             Ok::<_, Failure>(written.folder.display().to_string())
         };
-        Ok(py.detach(of)?)
+        worker::detached(py, of)
     }
 
     /// A new controller: what it promises as JSON, and its matrices (positive feedback).

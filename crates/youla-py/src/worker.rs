@@ -87,6 +87,11 @@ pub(crate) fn run<T: Send + 'static>(
     }
 }
 
+/// Does short work without the GIL, on threads of its own in a forked process.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
+    Ok(py.detach(|| if forked() { on_threads(0, work) } else { work() })?)
+}
+
 /// On a pool of so many threads; 0 for one per core.
 fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).stack_size(STACK).build();

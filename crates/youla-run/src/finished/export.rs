@@ -10,7 +10,7 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-use youla::signal::unknown;
+use youla::signal::{Channel, unknown};
 use youla_io::export::{
     ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, PidExport, model_from_bytes, read_model,
 };
@@ -68,13 +68,15 @@ pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerE
     let path = run.join("2-factor/left.json");
     let (nominal, left) = (read_model(base_of(run))?, read_model(&path)?);
     let q_origin = q.map(|q| Ok::<_, Error>(format!(" and {}", origin(q, q)?))).transpose()?.unwrap_or_default();
+    let of_machine = [nominal.inputs.as_slice(), &nominal.outputs].concat();
+    let q = q.map(|path| parameter(path, &of_machine)).transpose()?;
     Ok(ControllerExport {
         name: "controller".into(),
         measured: nominal.outputs,
         commanded: nominal.inputs,
         nominal: nominal.system,
         left: left.system,
-        q: q.map(parameter).transpose()?,
+        q,
         origin: origin(run, &path)? + &q_origin,
     })
 }
@@ -197,12 +199,25 @@ fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
 }
 
 /// Q from either kind of file.
-fn parameter(path: &Path) -> Result<StateSpace<Discrete>> {
+/// A Q; `of_machine` are the channels of the machine, which are none of beta and alpha.
+fn parameter(path: &Path, of_machine: &[Channel]) -> Result<StateSpace<Discrete>> {
     let bytes = youla_io::read_bytes(path)?;
     match serde_json::from_slice::<ExportedController>(&bytes) {
         Ok(ExportedController { q: Some(q), ts, .. }) => Ok(q.system(Discrete::new(ts)?)?),
         Ok(_) => Err(not(path, "this controller was not designed by its Q")),
-        Err(_) => Ok(model_from_bytes(&bytes, path)?.system),
+        Err(_) => {
+            let model = model_from_bytes(&bytes, path)?;
+            let foreign = |names: &[Channel]| names.iter().any(|c| of_machine.iter().any(|own| own.name == c.name));
+            if foreign(&model.inputs) || foreign(&model.outputs) {
+                let [from, to] = [&model.inputs, &model.outputs]
+                    .map(|of| of.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "));
+                let problem = format!(
+                    "this model goes from {from} to {to}, channels of the machine; a Q goes from beta to alpha"
+                );
+                return Err(not(path, &problem));
+            }
+            Ok(model.system)
+        }
     }
 }
 

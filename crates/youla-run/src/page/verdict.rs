@@ -9,7 +9,7 @@ use crate::result::Identification;
 use crate::summary::Summary;
 use crate::summary::model::{ModelEntry, ResidualEntry};
 use youla::identify::likelihood::{Evidence, Outcome};
-use youla_loop::check::{Finding, Severity};
+use youla_loop::check::{Finding, Severity, Test};
 use youla_report::data::{ReportPart, Status, Verdict};
 use youla_report::numbers;
 
@@ -168,7 +168,12 @@ fn data_line(found: &Identification) -> Option<Verdict> {
         (warnings, "data warning"),
         (count(Severity::Caution, true), "warning about the settings"),
     ]);
-    let text = format!("{controller} {checked}.");
+    // The gravest of them; that of the controller has its sentence.
+    let others =
+        || found.data.findings.iter().filter(|f| f.test != Test::Controller && f.severity >= Severity::Caution);
+    let gravest = others().max_by_key(|f| f.severity);
+    let which = gravest.map_or(String::new(), |f| format!(": {}", f.what));
+    let text = format!("{controller} {checked}{which}.");
     let evidence = if of_controller > of_check { ReportPart::Signals } else { ReportPart::Data };
     Some(Verdict { status: of_controller.max(of_check), text, evidence })
 }
@@ -199,7 +204,9 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
         Severity::Caution => Status::Caution,
         Severity::Defect => Status::Bad,
     };
-    (capital(&format!("{}.", finding.what)), status)
+    let told = finding.numbers.contains_key("residual_after");
+    let advice = if told { format!(" {}.", finding.advice) } else { String::new() };
+    (capital(&format!("{}.{advice}", finding.what)), status)
 }
 
 /// The same from the alpha that the factors give, where alpha itself was logged.

@@ -89,9 +89,11 @@ impl ControllerSettings {
                 };
                 let form = "[controller.ideal_pid], ki as ti and kd as td".to_owned();
                 let mut all = vec![self.under_other_rule(pid.discretisation), (form, Self::IdealPid(ideal))];
-                all.extend((0..=LONGEST_DELAY).filter(|delay| *delay != pid.delay).map(|delay| {
-                    (format!("delay = {delay}"), Self::Pid(ParallelPid { delay, ..pid.clone() }))
-                }));
+                all.extend(
+                    (0..=LONGEST_DELAY)
+                        .filter(|delay| *delay != pid.delay)
+                        .map(|delay| (format!("delay = {delay}"), Self::Pid(ParallelPid { delay, ..pid.clone() }))),
+                );
                 if let LoopGain::One(filter) = pid.derivative_filter
                     && filter > 0.0
                 {

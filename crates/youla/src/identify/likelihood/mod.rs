@@ -70,6 +70,8 @@ const SAMPLES_PER_PARAMETER: usize = 10;
 /// Records with fewer samples are left out where there is a longer one: their ends take as many parameters as they have information. A log with
 /// lost rows has such stretches.
 pub const SHORTEST_RECORD: usize = 100;
+/// Largest order of a model: time and memory grow with its square and more, 17 s at 100 and 14 GB at 500.
+pub const LARGEST_ORDER: usize = 100;
 
 /// The model that the records support, with its evidence.
 ///
@@ -291,8 +293,9 @@ fn problem<'a>(
         let must = "at most a quarter of the longest record, in samples";
         return Err(Error::OutOfRange { what: "the dead time".into(), value: skip as f64, must });
     }
-    if order == 0 || options.largest_order == 0 {
-        return Err(Error::OutOfRange { what: "the order".into(), value: 0.0, must: "at least one" });
+    let within = 1..=LARGEST_ORDER;
+    if let Some(order) = [order, options.largest_order].into_iter().find(|order| !within.contains(order)) {
+        return Err(Error::OutOfRange { what: "the order".into(), value: order as f64, must: "from 1 to 100" });
     }
     let sizes = Sizes::of(experiments);
     // What is stated wrongly must not spoil what is logged rightly: the controller enters after it has passed.

@@ -30,7 +30,7 @@ pub struct LikelihoodOptions {
 
 impl Default for LikelihoodOptions {
     fn default() -> Self {
-        let (largest_order, sampled_every) = (100, Vec::new());
+        let (largest_order, sampled_every) = (super::LARGEST_ORDER, Vec::new());
         LikelihoodOptions {
             order: None,
             dead_time: None,

@@ -90,7 +90,9 @@ impl Excess {
         let mut out = vec![false; self.bands.first().map_or(0, |band| band.squares.len())];
         for band in &self.bands {
             let means = self.means(band.share, squares);
-            out.iter_mut().zip(means).for_each(|(o, (_, mean))| *o |= mean.excess > 1.0 && mean.deviations > deviations);
+            out.iter_mut()
+                .zip(means)
+                .for_each(|(o, (_, mean))| *o |= mean.excess > 1.0 && mean.deviations > deviations);
         }
         out
     }

@@ -126,6 +126,18 @@ fn a_missing_mode_is_named_with_its_frequency() {
     assert!(low < 60.0 && 60.0 < high && high < 120.0, "{low} to {high} Hz, the mode is at 60 Hz");
     assert!(test.note.contains("the model is likely wrong there"), "{}", test.note);
     assert!(!found.trusted());
+    // The entry has another form than the model: every band and every stated deviation is one that the excitation confirms.
+    let (region, truth) = (&found.model.region, plant(1.0));
+    let at = |of: &StateSpace<Discrete>, hz: f64| {
+        frequency_response(of, &[std::f64::consts::TAU * hz]).unwrap().at(0)[(0, 0)]
+    };
+    let error = |hz: f64| (at(&found.model.plant, hz) - at(&truth, hz)).norm();
+    let held = |k: &usize| error(region.hz[*k]) < 2.0 * region.absolute[*k][(0, 0)];
+    assert!((0..region.hz.len()).filter(held).count() as f64 > 0.9 * region.hz.len() as f64);
+    let inside = |hz: f64| found.model.bands.iter().any(|[low, high]| (*low..=*high).contains(&hz));
+    let wrong: Vec<f64> =
+        region.hz.iter().copied().filter(|hz| inside(*hz) && error(*hz) > 0.2 * at(&truth, *hz).norm()).collect();
+    assert!(wrong.is_empty(), "{wrong:?} in {:?}", found.model.bands);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! acts on the outputs alone, `y = G u + cos, sin + v`: its amplitudes are those of the residual without the mode. What is left of the
 //! outputs, without the lines next to it (weight zero), says whether it was one: then the criterion is less without the mode.
 
+use super::line_fit::{Line, Residual, WIDEST, disturbance, sharpened, with_sidebands};
 use super::loads::{self, Nuisance, Steps};
 use super::problem::{Choice, Problem, Solution, Task};
 use super::unmoved::Motion;
@@ -16,10 +17,8 @@ use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
 use crate::identify::verdict::limits::LARGEST_LINE;
 use crate::linalg::TINY;
-use faer::linalg::solvers::SolveLstsq;
-use faer::{Mat, c64};
-use rustfft::FftPlanner;
-use std::f64::consts::{PI, TAU};
+use faer::Mat;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Rounds of modes that are left out.
@@ -27,43 +26,13 @@ const ROUNDS: usize = 5;
 /// Slow changes of a disturbance, `cos(pi j t / N)` with `j` below the first number, and lines on each side that do not count: the first of
 /// these that are enough. A rotor whose speed wanders has sidebands.
 const SHAPES: [(usize, f64); 5] = [(1, 5.0), (9, 5.0), (9, 10.0), (9, 20.0), (9, 40.0)];
-/// Largest half width of the band that does not count, over its middle.
-const WIDEST: f64 = 0.25;
 /// Lowest frequency of such a mode, in lines: below it a drift of the record is one.
 const LOWEST: f64 = 8.0;
-/// Half bands of a disturbance within which a mode may stand for its sidebands, and half width of such a mode, in lines of the longest record.
-const SIDEBANDS: f64 = 2.0;
+/// Half width of a mode that may stand for sidebands, in lines of the longest record.
 const SIDEBAND: f64 = 0.6;
-/// Samples of a record for each slow change at least.
-const SAMPLES_PER_CHANGE: usize = 8;
-/// Lines beside the band that does not count from which the amplitudes are estimated, for each slow change: ten equations for each unknown.
-const AROUND: f64 = 5.0;
-/// Half bands within which sidebands are sought, sizes that are tried, each twice the last, and the gain of the likelihood that shows them.
-const SKIRT_REACH: f64 = 20.0;
-const SKIRTS: i32 = 6;
-const SKIRT_NATS: f64 = 5.0;
-/// Sweeps over the disturbances, which are nearly orthogonal.
-const SWEEPS: usize = 2;
-
 /// Ratio of two frequencies that are listed as one, and frequencies that are listed.
 const SAME: f64 = 1.05;
 const LISTED: usize = 6;
-
-/// A disturbance at one frequency.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Line {
-    /// Its frequency, and half of the band that does not count.
-    mask: Mask,
-    /// Slow changes of its amplitudes.
-    changes: usize,
-}
-
-impl Line {
-    /// Whether a frequency is that of its sidebands.
-    fn near(&self, turns: f64) -> bool {
-        (self.mask.middle - turns).abs() < SIDEBANDS * self.mask.half
-    }
-}
 
 /// A model and the inputs and outputs that it is the model of.
 #[derive(Clone)]
@@ -162,13 +131,14 @@ fn less_lines(
         let clean = now.records(k, records);
         narrow.residuals(&now.problem(all, &clean), choice, records)
     });
-    let lowest = narrow.turns.iter().copied().fold(f64::INFINITY, f64::min);
+    let turns: Vec<f64> = narrow.turns.iter().map(|turns| sharpened(&residuals[0], *turns, narrow.longest)).collect();
+    let lowest = turns.iter().copied().fold(f64::INFINITY, f64::min);
     for (changes, lines) in SHAPES {
         if lines / narrow.longest > WIDEST * lowest {
             break;
         }
         let mut taken = now.lines.clone();
-        narrow.turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
+        turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
         let outputs = [(all.experiments, &residuals[0]), (fresh, &residuals[1])].map(|(records, residuals)| {
             let of = |(e, left): (&Experiment<'_>, &Option<Residual>)| match left {
                 Some(left) => e.y - disturbance(left, e.y.nrows(), &taken),
@@ -194,7 +164,8 @@ fn less_lines(
                 let spectra = Arc::new(problem.spectra(delays));
                 let model = less.first()?.found.point.model.clone();
                 let start = with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
-                let task = Task { spectra, start, delays: delays.clone(), origin: "with the sidebands of a line".into() };
+                let task =
+                    Task { spectra, start, delays: delays.clone(), origin: "with the sidebands of a line".into() };
                 let weighed = problem.run(vec![task], f64::INFINITY, table);
                 let solution = problem.solve_from(weighed, table)?;
                 (next.solution, next.lines) = (solution, lines);
@@ -283,123 +254,5 @@ impl Narrow {
             Some(Residual { lines: Mat::from_fn(v.len() / p, p, |k, i| v[k * p + i] * scale(i)), samples })
         };
         records.iter().map(of).collect()
-    }
-}
-
-/// Lines with the sidebands that are in what a model of the records without them leaves.
-fn with_sidebands(lines: &[Line], problem: &Problem<'_>, choice: &Choice) -> Vec<Line> {
-    let bare = Problem { masked: Vec::new(), ..problem.clone() };
-    let spectra = bare.spectra(&choice.delays);
-    let residuals = choice.found.point.residuals(&spectra);
-    let of = |line: &Line| {
-            let skirt= skirt(&residuals, &spectra, &line.mask);
-            if std::env::var("DBG").is_ok() { eprintln!("{:?} {}", line, spectra.records[0].samples as f64 * skirt); }
-            Line { mask: Mask { skirt, ..line.mask }, ..*line }
-    };
-    lines.iter().map(of).collect()
-}
-
-/// Distance from a line of a disturbance at which its sidebands have the power of the noise, of the output where it is the largest, by
-/// Whittle's likelihood of the lines beside the band that does not count; 0 where they are not told from none.
-fn skirt(residuals: &[Vec<c64>], spectra: &Spectra, mask: &Mask) -> f64 {
-    let reach = (SKIRT_REACH * mask.half).min(WIDEST * mask.middle);
-    let p = spectra.outputs;
-    let of = |i: usize| {
-        let mut beside: Vec<(f64, f64)> = Vec::new();
-        for (v, lines) in residuals.iter().zip(&spectra.records) {
-            let place = |turns: f64| (turns * lines.samples as f64).clamp(1.0, lines.z.len() as f64) as usize - 1;
-            for k in place(mask.middle - reach)..place(mask.middle + reach) {
-                let turns = (k + 1) as f64 / lines.samples as f64;
-                if (turns - mask.middle).abs() > mask.half {
-                    beside.push((turns, v[k * p + i].norm_sqr()));
-                }
-            }
-        }
-        let cost = |skirt: f64| {
-            let mask = Mask { skirt, ..*mask };
-            let (mut level, mut logs) = (0.0, 0.0);
-            for (turns, power) in &beside {
-                level += power / mask.power(*turns);
-                logs += mask.power(*turns).ln();
-            }
-            beside.len() as f64 * (level / beside.len().max(1) as f64).ln() + logs
-        };
-        let none = cost(0.0);
-        let best = (0..SKIRTS).map(|j| 0.5 * mask.half * f64::from(j).exp2()).map(|s| (cost(s), s));
-        let (least, found) = best.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((none, 0.0));
-        if least < none - SKIRT_NATS { found } else { 0.0 }
-    };
-    (0..p).map(of).fold(0.0, f64::max)
-}
-
-/// The transform of the residual of the last samples of a record: lines from the first x channels.
-struct Residual {
-    lines: Mat<c64>,
-    samples: usize,
-}
-
-/// Disturbances over all rows of a record. The amplitudes of each are those of least squares on the lines around it, where the noise is
-/// that of its frequency: a drift has thousands of times the power of the noise there.
-fn disturbance(residual: &Residual, rows: usize, taken: &[Line]) -> Mat<f64> {
-    let Residual { lines, samples } = residual;
-    let fft = FftPlanner::new().plan_fft_forward(*samples);
-    let (mut left, mut all) = (lines.clone(), Mat::<f64>::zeros(rows, lines.ncols()));
-    for Line { mask, changes } in (0..SWEEPS).flat_map(|_| taken) {
-        // A short record determines no more.
-        let changes = (*changes).min(samples / SAMPLES_PER_CHANGE).max(1);
-        let shapes = Mat::from_fn(rows, 2 * changes, |t, c| {
-            let (sin, cos) = (TAU * (mask.middle * t as f64).fract()).sin_cos();
-            let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
-            slow * if c % 2 == 0 { cos } else { sin }
-        });
-        let mut transformed = Mat::<c64>::zeros(lines.nrows(), 2 * changes);
-        for (to, shape) in transformed.col_iter_mut().zip(shapes.col_iter()) {
-            let mut work: Vec<c64> = shape.iter().skip(rows - samples).map(|x| c64::new(*x, 0.0)).collect();
-            fft.process(&mut work);
-            to.iter_mut().zip(&work[1..]).for_each(|(to, x)| *to = *x);
-        }
-        // Row k is line k + 1.
-        let (middle, half) =
-            (mask.middle * *samples as f64 - 1.0, mask.half * *samples as f64 + AROUND * changes as f64);
-        let from = (middle - half).max(0.0) as usize;
-        let count = ((middle + half) as usize).min(lines.nrows() - 1) + 1 - from;
-        let part = |of: &Mat<c64>| {
-            Mat::from_fn(2 * count, of.ncols(), |r, c| {
-                let x = of[(from + r % count, c)];
-                if r < count { x.re } else { x.im }
-            })
-        };
-        let amplitudes = part(&transformed).qr().solve_lstsq(part(&left));
-        left -= &transformed * Mat::from_fn(2 * changes, left.ncols(), |i, j| c64::new(amplitudes[(i, j)], 0.0));
-        all += shapes * amplitudes;
-    }
-    all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::StandardNormal;
-
-    /// A line of amplitude 1 between two lines of the transform, in the residual of a double integrator under a slow torque, which falls with
-    /// the third power of frequency: the error of the amplitudes is that of the noise at the line.
-    #[test]
-    fn a_drift_does_not_spoil_the_amplitude_of_a_line() {
-        let (samples, turns, size) = (4000, 67.5 / 4000.0, 0.05);
-        let rng = &mut ChaCha8Rng::seed_from_u64(3);
-        let line = |t: usize| (TAU * turns * t as f64 + 0.4).cos();
-        let mut work: Vec<c64> = (0..samples).map(|t| c64::new(line(t), 0.0)).collect();
-        FftPlanner::new().plan_fft_forward(samples).process(&mut work);
-        let lines = Mat::from_fn(samples / 2, 1, |k, _| {
-            let size = size * (samples as f64 / 2.0).sqrt() * (67.5 / (k as f64 + 1.0)).powi(3);
-            work[k + 1] + c64::new(rng.sample(StandardNormal), rng.sample(StandardNormal)) * size
-        });
-        let taken = [Line { mask: Mask { middle: turns, half: 5.0 / samples as f64, skirt: 0.0 }, changes: 1 }];
-        let found = disturbance(&Residual { lines, samples }, samples, &taken);
-        let error = (0..samples).map(|t| (found[(t, 0)] - line(t)).powi(2)).sum::<f64>() / samples as f64;
-        // Two amplitudes, each of variance 2 size^2 / N: mean square 2 size^2 / N.
-        assert!(error < 4.0 * 2.0 * size * size / samples as f64, "{error}");
     }
 }

@@ -143,7 +143,7 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
         return unknown(keys.split(", ").next().unwrap_or_default(), &known, place);
     }
     if message.starts_with("wanted exactly 1 element") {
-        let found = if message.contains("found 0") { "none" } else { "more keys" };
+        let found = if message.contains("found 0") { "none" } else { "more than one" };
         let forms = forms_at(place);
         let key = "a key of one of them belongs into its table, such as `feedback` into [controller.pid]";
         let mend = if place.table.starts_with("controller") { format!("; {key}") } else { String::new() };

@@ -144,6 +144,8 @@ const INTEGRATOR: f64 = 1.0 + 1e-6;
 /// And less than this share of what a change before it leaves.
 /// Chosen, not measured.
 const CLEARER: f64 = 0.8;
+/// What changes leave below which they explain alike: a log of five digits leaves this.
+const ROUNDING: f64 = 1e-5;
 /// A change must leave less than this share of the residual.
 /// Chosen, not measured.
 const HELPS: f64 = 0.1;
@@ -185,8 +187,8 @@ pub fn controller<'a>(
     let mut change = None;
     if residual > options.controller_caution {
         for (candidate, left) in log.changes(k, of_gain)? {
-            // The simpler changes come first.
-            if change.as_ref().is_none_or(|(_, best)| left < CLEARER * best) {
+            // The simpler changes come first; a factor of -1 fits rounding better than a sign does.
+            if change.as_ref().is_none_or(|(_, best)| left + ROUNDING < CLEARER * (best + ROUNDING)) {
                 change = Some((candidate, left));
             }
         }

@@ -121,7 +121,7 @@ pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> 
     deviance_of(spectra, point, (noise_order, false))
 }
 
-/// The same with noise at the inputs that may have a colour where up to seven outputs see it together.
+/// The same with noise at the inputs that may have a colour.
 fn deviance_of(spectra: &Spectra, point: &Point, noise: (usize, bool)) -> (f64, Noise) {
     let residuals = point.residuals(spectra);
     let noise = Noise::fit(spectra, &residuals, noise, &point.model);
@@ -185,7 +185,9 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
 
 /// What a search makes small, and the noise of the point.
 fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
-    let (value, noise) = deviance_of(spectra, point, (options.noise_order, true));
+    // Autoregressions of single outputs do not stand for the colour of what several see.
+    let coloured = (options.filter_moves || spectra.outputs > 1) && !separable(spectra.outputs);
+    let (value, noise) = deviance_of(spectra, point, (options.noise_order, coloured));
     (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
 }
 

@@ -34,12 +34,15 @@ impl Rows {
             }
             first += s;
         }
-        if let Some(joint) = &self.joint {
-            for (j, end) in place.ends.iter().enumerate() {
-                let by = |o| joint.driven((o, j), ends);
-                self.innovations.iter_mut().enumerate().for_each(|(o, v)| v.add_scaled(&by(o), -end));
+        match &self.joint {
+            Some(joint) => {
+                for (j, end) in place.ends.iter().enumerate() {
+                    let by = |o| joint.driven((o, j), ends);
+                    self.innovations.iter_mut().enumerate().for_each(|(o, v)| v.add_scaled(&by(o), -end));
+                }
+                joint.apply(&mut self.innovations, 1, &mut self.unfiltered);
             }
-            joint.apply(&mut self.innovations, 1, &mut self.unfiltered);
+            None => entering.innovation(&mut self.innovations[0], &z.conj()),
         }
         self.entered.fill(Lanes::ZERO);
         if let Some(pole) = entering.colour() {

@@ -58,11 +58,8 @@ pub(crate) fn run<T: Send + 'static>(
     let (sender, mut receiver) = sync_channel(1);
     let of_thread = stop.clone();
     let body = move || {
-        let result = match (single, forked()) {
-            (true, _) => on_threads(1, || work(&of_thread)),
-            (false, true) => on_threads(0, || work(&of_thread)),
-            (false, false) => work(&of_thread),
-        };
+        let work = || work(&of_thread);
+        let result = if single { on_threads(1, work) } else { on_live_threads(work) };
         // Nobody waits after an interrupt.
         let _ = sender.send(result);
     };
@@ -89,7 +86,12 @@ pub(crate) fn run<T: Send + 'static>(
 
 /// Does short work without the GIL, on threads of its own in a forked process.
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
-    Ok(py.detach(|| if forked() { on_threads(0, work) } else { work() })?)
+    Ok(py.detach(|| on_live_threads(work))?)
+}
+
+/// On the pool of the process, in a forked one on a pool of its own.
+fn on_live_threads<T: Send>(work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    if forked() { on_threads(0, work) } else { work() }
 }
 
 /// On a pool of so many threads; 0 for one per core.

@@ -10,11 +10,13 @@ use youla_loop::check::{Finding, Severity, Test};
 pub fn agreement(check: impl Fn(Feedback) -> Option<DataCheck>) -> &'static str {
     let explains = |sign: Feedback| {
         let contradicts = |f: &Finding| f.test == Test::Controller && f.severity == Severity::Defect;
-        check(sign).is_some_and(|found| !found.findings.iter().any(contradicts))
+        check(sign).map(|found| !found.findings.iter().any(contradicts))
     };
     match [explains(Feedback::Negative), explains(Feedback::Positive)] {
-        [true, false] => "; the log agrees with negative",
-        [false, true] => "; the log agrees with positive",
+        // More is wrong than the sign: nothing could be compared.
+        [None, None] => "",
+        [Some(true), None | Some(false)] => "; the log agrees with negative",
+        [None | Some(false), Some(true)] => "; the log agrees with positive",
         _ => "; the log agrees with both or neither",
     }
 }
@@ -40,9 +42,6 @@ pub fn parse_settings(text: &str, path: &Path) -> Result<RunSettings> {
 
 fn with_agreement(error: Error, text: &str, path: &Path) -> Error {
     let Error::File(youla_io::Error::Settings { path: file, at, problem }) = error else { return error };
-    if !problem.contains("`feedback`") {
-        return Error::File(youla_io::Error::Settings { path: file, at, problem });
-    }
     let shown = RunSettings::without_feedback(text).map_or("", |with| {
         let folder = path.parent().unwrap_or(Path::new(""));
         agreement(|sign| check_run(&with(sign)?, folder).ok())

@@ -198,8 +198,7 @@ fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
     Ok(LoopExport { name: "loop".into(), measured, commanded, observer, ts, origin })
 }
 
-/// Q from either kind of file.
-/// A Q; `of_machine` are the channels of the machine, which are none of beta and alpha.
+/// Q from either kind of file; `of_machine` are the channels of the machine, which are none of beta and alpha.
 fn parameter(path: &Path, of_machine: &[Channel]) -> Result<StateSpace<Discrete>> {
     let bytes = youla_io::read_bytes(path)?;
     match serde_json::from_slice::<ExportedController>(&bytes) {

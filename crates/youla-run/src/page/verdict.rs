@@ -169,9 +169,8 @@ fn data_line(found: &Identification) -> Option<Verdict> {
         (count(Severity::Caution, true), "warning about the settings"),
     ]);
     // The gravest of them; that of the controller has its sentence.
-    let others =
-        || found.data.findings.iter().filter(|f| f.test != Test::Controller && f.severity >= Severity::Caution);
-    let gravest = others().max_by_key(|f| f.severity);
+    let others = found.data.findings.iter().filter(|f| f.test != Test::Controller && f.severity >= Severity::Caution);
+    let gravest = others.max_by_key(|f| f.severity);
     let which = gravest.map_or(String::new(), |f| format!(": {}", f.what));
     let text = format!("{controller} {checked}{which}.");
     let evidence = if of_controller > of_check { ReportPart::Signals } else { ReportPart::Data };

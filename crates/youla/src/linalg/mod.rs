@@ -6,6 +6,7 @@
 mod definite;
 mod eigen;
 mod expm;
+mod golden_section;
 mod gramian;
 mod gramian_balancing;
 mod kronecker;
@@ -27,6 +28,7 @@ pub(crate) use eigen::hessenberg::hessenberg;
 pub use eigen::reorder::OrderedSchur;
 pub use eigen::schur::{RealSchur, real_schur};
 pub use expm::expm;
+pub(crate) use golden_section::golden_section;
 pub(crate) use gramian::{discrete_gramian_factor, gramian_factor};
 pub(crate) use gramian_balancing::gramian_balancing;
 pub use least_squares::regress;

@@ -1,18 +1,14 @@
 //! The law from part to part of a record: controllers are switched, and scheduled with speed or load.
 //!
-//! With v the response of the declared controller to e from rest and P the projection beside its free responses, each part has a factor on
-//! the gain and what it leaves,
-//!
-//! ```text
-//! factor = (P v)' (P w) / |P v|^2,        left = |P w - factor P v| / |w|
-//! ```
+//! Each part has the factor on the gain that [`gains`](super::gains) gives and what it leaves of w, over the size of w.
 
-use super::log::{Log, centred, with_constant};
+use super::gains::{Beside, factor};
+use super::log::{Log, centred};
 use crate::check::finding::few;
 use crate::error::Result;
 use std::ops::Range;
 use youla::Mat;
-use youla::lti::{Discrete, StateSpace, simulate, simulate_best};
+use youla::lti::{Discrete, StateSpace};
 
 /// Parts of a record, and rows of a part for each state of the controller, at least.
 /// Chosen, not measured.
@@ -64,11 +60,11 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
     if count < 2 * STRETCH {
         return Ok(None);
     }
-    let constant = with_constant(k)?;
+    let beside = Beside::new(k)?;
     // The last part has the rest of the rows.
     let samples =
         |parts: Range<usize>| parts.start * rows..if parts.end == count { log.w.nrows() } else { parts.end * rows };
-    let all = (0..count).map(|i| part(log, &constant, samples(i..i + 1))).collect::<Result<Vec<Part>>>()?;
+    let all = (0..count).map(|i| part(log, k, &beside, samples(i..i + 1))).collect::<Result<Vec<Part>>>()?;
     let holds: Vec<bool> = all.iter().map(|p| p.declared <= caution).collect();
     let explained = |p: &&Part| p.left <= EXPLAINED * caution;
     let factors = |of: &[&Part]| {
@@ -105,16 +101,12 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
     Ok((low > 0.0 && high > SPREAD * low).then_some(Parts::Scheduled([low, high])))
 }
 
-fn part(log: &Log<'_>, constant: &StateSpace<Discrete>, at: Range<usize>) -> Result<Part> {
+fn part(log: &Log<'_>, k: &StateSpace<Discrete>, beside: &Beside, at: Range<usize>) -> Result<Part> {
     let (e, w) = (log.e.subrows(at.start, at.len()), log.w.subrows(at.start, at.len()));
-    let rest = Mat::<f64>::zeros(e.nrows(), e.ncols());
-    let beside = |x: &Mat<f64>| -> Result<Mat<f64>> { Ok(x - simulate_best(constant, rest.as_ref(), x.as_ref())?) };
-    let v = beside(&simulate(constant, e, &vec![0.0; constant.order()])?)?;
-    let (size, w) = (centred(&w.to_owned()).norm_l2().max(f64::MIN_POSITIVE), beside(&w.to_owned())?);
-    let product: f64 = v.col_iter().zip(w.col_iter()).map(|(v, w)| v.transpose() * w).sum();
-    let factor = product / v.squared_norm_l2().max(f64::MIN_POSITIVE);
-    let left = |factor: f64| (&w - faer::Scale(factor) * &v).norm_l2() / size;
-    Ok(Part { declared: left(1.0), factor, left: left(factor) })
+    let (v, size) = (beside.response(k, e)?, centred(&w.to_owned()).norm_l2().max(f64::MIN_POSITIVE));
+    let w = beside.of(w)?;
+    let (factor, left) = factor(&v, &w);
+    Ok(Part { declared: (&w - &v).norm_l2() / size, factor, left: left / size })
 }
 
 /// Runs of equal values.

@@ -9,6 +9,7 @@
 //! until their intervals cover all frequencies, which proves the level; where the bound itself exceeds it, the level rises.
 
 use super::peak_of;
+use crate::linalg::golden_section;
 use crate::lti::{Curve, PeakGain, StateSpace, TimeDomain, below_level, largest_singular_value};
 use crate::{Error, Mat, MatRef, Result, c64};
 use faer::Side;
@@ -25,6 +26,8 @@ const ROUNDING: f64 = 1e-13;
 
 /// Largest logarithm of a scaling.
 const REACH: f64 = 12.0;
+/// Width within which a logarithm is found.
+const WITHIN: f64 = 1e-6;
 
 /// Bounds of the peak of a stable square system, whose difference from a multiple of the identity may have a low rank.
 pub(super) fn structured_peak<T: TimeDomain>(system: &StateSpace<T>, identity: f64) -> Result<PeakGain> {
@@ -190,7 +193,7 @@ fn best_scaling(gain: &Gain) -> Result<(f64, Vec<f64>)> {
         let before = least;
         for k in 1..size {
             let start = x[k];
-            let (found, at) = golden_section(|step| {
+            let (found, at) = golden_section([-REACH, REACH], WITHIN, |step| {
                 x[k] = step;
                 value(&x)
             })?;
@@ -201,26 +204,6 @@ fn best_scaling(gain: &Gain) -> Result<(f64, Vec<f64>)> {
         }
     }
     Ok((least, x))
-}
-
-/// The least value of a convex function within the reach, and where.
-fn golden_section(mut f: impl FnMut(f64) -> Result<f64>) -> Result<(f64, f64)> {
-    let ratio = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut low, mut high) = (-REACH, REACH);
-    let (mut x, mut y) = (high - ratio * (high - low), low + ratio * (high - low));
-    let (mut at_x, mut at_y) = (f(x)?, f(y)?);
-    while high - low > 1e-6 {
-        if at_x < at_y {
-            (high, y, at_y) = (y, x, at_x);
-            x = high - ratio * (high - low);
-            at_x = f(x)?;
-        } else {
-            (low, x, at_x) = (x, y, at_y);
-            y = low + ratio * (high - low);
-            at_y = f(y)?;
-        }
-    }
-    Ok(if at_x < at_y { (at_x, x) } else { (at_y, y) })
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 
 use super::problem::{Choice, Problem};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra};
-use crate::linalg::TINY;
+use crate::linalg::{TINY, golden_section};
 use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, c64};
 use rustfft::FftPlanner;
+use std::convert::Infallible;
 use std::f64::consts::{PI, TAU};
 
 /// Largest half width of the band that does not count, over its middle.
@@ -14,8 +15,8 @@ pub(super) const WIDEST: f64 = 0.25;
 const SIDEBANDS: f64 = 2.0;
 /// Lines beside the band that does not count from which the amplitudes are estimated, for each slow change: ten equations for each unknown.
 const AROUND: f64 = 5.0;
-/// Steps of the search for the frequency of a line: to a millionth of one.
-const SECTIONS: usize = 30;
+/// Part of a line within which its frequency is found.
+const WITHIN: f64 = 1e-6;
 /// Sweeps over the disturbances, which are nearly orthogonal.
 const SWEEPS: usize = 2;
 /// Half bands within which sidebands are sought, sizes that are tried, each twice the last, and the gain of the likelihood that shows them.
@@ -95,15 +96,11 @@ pub(super) struct Residual {
 /// The frequency around a given one at which a cosine and a sine explain most of some residuals, by golden section within half a line of the
 /// longest record: a mode that stands for a line has its frequency but for a few hundredths of a line.
 pub(super) fn sharpened(residuals: &[Option<Residual>], turns: f64, longest: f64) -> f64 {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let explained = |turns: f64| residuals.iter().flatten().map(|r| r.explained(turns)).sum::<f64>();
-    let (mut low, mut high) = (turns - 0.5 / longest, turns + 0.5 / longest);
-    let inner = |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
-    for _ in 0..SECTIONS {
-        let [left, right] = inner(low, high);
-        if explained(left) > explained(right) { high = right } else { low = left }
-    }
-    0.5 * (low + high)
+    let half = 0.5 / longest;
+    let less = |turns: f64| Ok::<_, Infallible>(-explained(turns));
+    let Ok((_, found)) = golden_section([turns - half, turns + half], WITHIN / longest, less);
+    found
 }
 
 impl Residual {

@@ -155,9 +155,11 @@ impl Spectra {
         let (m, p) = (self.inputs, self.outputs);
         for lines in &mut self.records {
             let samples = lines.samples as f64;
-            for k in 0..if masks.iter().any(|mask| mask.skirt > 0.0) { lines.z.len() } else { 0 } {
-                let power: f64 = masks.iter().map(|mask| mask.power((k + 1) as f64 / samples) - 1.0).sum();
-                let scale = 1.0 / (1.0 + power).sqrt();
+            let sidebands: Vec<&Mask> = masks.iter().filter(|mask| mask.skirt > 0.0).collect();
+            for k in (0..lines.z.len()).take_while(|_| !sidebands.is_empty()) {
+                let turns = (k + 1) as f64 / samples;
+                let power = 1.0 + sidebands.iter().map(|mask| mask.power(turns) - 1.0).sum::<f64>();
+                let scale = 1.0 / power.sqrt();
                 lines.u[k * m..(k + 1) * m].iter_mut().for_each(|u| *u *= scale);
                 lines.y[k * p..(k + 1) * p].iter_mut().for_each(|y| *y *= scale);
                 lines.ends[k] *= scale;

@@ -1,6 +1,7 @@
 //! Noise that enters at the inputs of a plant: its likelihood, its predictor, and a control without it.
 
 use super::deviation::innovation::predictor;
+use super::search::autoregression::Regression;
 use super::search::chart::Chart;
 use super::search::linearise::linearise;
 use super::search::model::Model;
@@ -66,7 +67,7 @@ fn gain(plant: &StateSpace<Discrete>, share: f64) -> f64 {
 fn the_likelihood_of_noise_at_the_input_is_that_of_its_spectrum() {
     let (u, y) = record(0.3, 0.02, 1);
     let (value, noise) = of_the_machine(&u, &y);
-    assert!(noise.regression[0].driven.is_some());
+    assert!(noise.joint.is_some());
     let plant = machine(0.98);
     let lines = 1..SAMPLES;
     let expected: f64 =
@@ -78,7 +79,7 @@ fn the_likelihood_of_noise_at_the_input_is_that_of_its_spectrum() {
 fn white_noise_at_the_output_is_none_at_the_input() {
     let (u, y) = record(0.0, 0.02, 2);
     let (_, noise) = of_the_machine(&u, &y);
-    assert!(noise.regression[0].driven.is_none());
+    assert!(noise.joint.is_none());
 }
 
 #[test]
@@ -96,7 +97,7 @@ fn the_predictor_has_the_spectrum_of_noise_at_the_input_also_of_an_unstable_plan
         };
         let residuals = vec![(1..=SAMPLES / 2).map(&mut line).collect::<Vec<c64>>()];
         let noise = Noise::fit(&spectra, &residuals, (40, false), &model);
-        assert!(noise.regression[0].driven.is_some());
+        assert!(noise.joint.is_some());
         let states = model.matrices();
         let plant = StateSpace::new(states.0, states.1, states.2, Mat::zeros(1, 1), plant.time()).unwrap();
         let found = predictor(&plant, &noise, &[1.0]);
@@ -137,9 +138,15 @@ fn the_slope_of_noise_at_the_input_is_that_of_its_likelihood() {
     let (spectra, plant) = (unscaled(&u, &y), machine(0.97));
     let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
     let point = with_best_ends(&spectra, model.clone(), &Noise::white(1));
-    let (_, noise) = deviance(&spectra, &point, 40);
-    let ratio = noise.entry().unwrap().ratio();
+    // The filter of one of many outputs.
     let (lines, residuals) = (&spectra.records[0], point.residuals(&spectra));
+    let (gains, white) = (driven::Gains::new(&model, &spectra), Regression::default());
+    let of_output = driven::Driven::new(&model, (&spectra, &gains), &residuals, (0, &white)).unwrap();
+    let ratio = of_output.kalman.entry.ratio();
+    let mut noise = Noise::white(1);
+    noise.regression[0].driven = Some(of_output.into());
+    noise.covariance = covariance(&spectra, &point, &noise);
+    noise.root[(0, 0)] = 1.0 / noise.covariance[(0, 0)].sqrt();
     let shape = |model: &Model, k: usize| 1.0 + ratio * model.response(lines.z[k])[0].norm_sqr();
     let value = |moved: &Model| -> f64 {
         let of_line = |k: usize| {
@@ -178,23 +185,32 @@ fn covariance(spectra: &Spectra, point: &Point, noise: &Noise) -> Mat<f64> {
     products * faer::Scale(1.0 / spectra.samples() as f64)
 }
 
+/// The inverse of H at a line.
+fn whitener(noise: &Noise, z: c64) -> Mat<c64> {
+    let p = noise.regression.len();
+    let mut filters = vec![c64::ZERO; p];
+    noise.filters(z, &mut filters);
+    let mut whitener = Mat::<c64>::identity(p, p);
+    if let Some(joint) = &noise.joint {
+        let mut lanes = joint.filters();
+        joint.filter(&Lanes::gather(|_| z), &mut lanes);
+        let value = |x: usize| c64::new(lanes.whitener[x].re[0], lanes.whitener[x].im[0]);
+        whitener = Mat::from_fn(p, p, |i, j| value(i * p + j));
+    }
+    Mat::from_fn(p, p, |i, j| filters[i] * whitener[(i, j)])
+}
+
 /// Half the deviance of a model whose noise at the inputs has the size and colour of `noise`, and its autoregression.
 fn half_deviance(spectra: &Spectra, model: Model, noise: &Noise) -> f64 {
     let noise = entering(&model, noise.clone(), noise.entry().unwrap().clone());
     let point = with_best_ends(spectra, model, &noise);
-    let outside: f64 = point.model.poles().iter().map(|p| p.norm().ln().max(0.0)).sum();
-    // The filter of several outputs leaves the innovations themselves.
-    let outside = if noise.joint.is_some() { 0.0 } else { outside };
-    0.5 * spectra.samples() as f64 * (covariance(spectra, &point, &noise).determinant().ln() + 2.0 * outside)
+    // The filter leaves the innovations themselves.
+    0.5 * spectra.samples() as f64 * covariance(spectra, &point, &noise).determinant().ln()
 }
 
 /// The noise with that of these variances and colour at the inputs of a model.
 fn entering(model: &Model, mut noise: Noise, entry: driven::Entry) -> Noise {
-    if model.outputs == 1 {
-        noise.regression[0].driven = driven::Driven::of_entry(model, &[], (0, entry)).map(Into::into);
-    } else {
-        noise.joint = driven::Joint::of_entry(model, &[], entry).map(Into::into);
-    }
+    noise.joint = driven::Joint::of_entry(model, &[], entry).map(Into::into);
     noise
 }
 
@@ -311,21 +327,10 @@ fn the_predictor_has_the_filter_of_noise_with_a_colour() {
         for share in [0.001, 0.02, 0.0207, 0.1, 0.4] {
             let omega = std::f64::consts::TAU * share;
             let response = frequency_response(&h, &[omega / plant.time().ts()]).unwrap().at(0).to_owned();
-            let mut filters = vec![c64::ZERO; outputs];
-            noise.filters(c64::cis(omega), &mut filters);
-            let mut whitener = Mat::<c64>::identity(outputs, outputs);
-            if let Some(joint) = &noise.joint {
-                let mut lanes = joint.filters();
-                joint.filter(&Lanes::gather(|_| c64::cis(omega)), &mut lanes);
-                whitener = Mat::from_fn(outputs, outputs, |i, j| {
-                    let value = &lanes.whitener[i * outputs + j];
-                    c64::new(value.re[0], value.im[0])
-                });
-            }
-            let product = whitener * response;
+            let product = whitener(&noise, c64::cis(omega)) * response;
             for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
                 let expected = if i == j { c64::ONE } else { c64::ZERO };
-                assert!((product[(i, j)] * filters[i] - expected).norm() < 1e-6, "{outputs} {share} {i} {j}");
+                assert!((product[(i, j)] - expected).norm() < 1e-6, "{outputs} {share} {i} {j}");
             }
         }
     }
@@ -355,9 +360,8 @@ fn the_predictor_after_a_search_has_the_filter_of_its_noise() {
     let h = StateSpace::new(stated.a, stated.k.unwrap(), stated.c, Mat::identity(1, 1), plant.time()).unwrap();
     for share in [0.005, 0.02, 0.0207, 0.022, 0.1, 0.4] {
         let omega = std::f64::consts::TAU * share;
-        let mut filter = [c64::ZERO];
-        found.noise.filters(c64::new(omega.cos(), omega.sin()), &mut filter);
+        let filter = whitener(&found.noise, c64::cis(omega))[(0, 0)];
         let response = frequency_response(&h, &[omega / plant.time().ts()]).unwrap().at(0)[(0, 0)];
-        assert!((response * filter[0] - c64::ONE).norm() < 1e-6, "{share}: {response} and {}", filter[0]);
+        assert!((response * filter - c64::ONE).norm() < 1e-6, "{share}: {response} and {filter}");
     }
 }

@@ -25,10 +25,8 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
     let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * size(i) * size(j));
     // Noise at the inputs moves the states of the plant; of many outputs each has its own, independent of the others. A colour has a state
     // for each input.
-    let of_each: Vec<Option<&Driven>> =
-        noise.regression.iter().map(|r| r.driven.as_deref().filter(|_| p > 1)).collect();
-    let alone = || noise.regression.iter().filter(|_| p == 1).find_map(|r| r.driven.as_deref());
-    let shared = noise.joint.as_ref().map(|joint| &joint.kalman).or_else(|| alone().map(|driven| &driven.kalman));
+    let of_each: Vec<Option<&Driven>> = noise.regression.iter().map(|r| r.driven.as_deref()).collect();
+    let shared = noise.joint.as_ref().map(|joint| &joint.kalman);
     let colours = shared.map_or(0, |kalman| kalman.of_colour.nrows());
     let copies: usize = of_each.iter().flatten().map(|driven| driven.kalman.gain.nrows()).sum();
     let own = colours + copies;

@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub(crate) struct Noise {
     /// a_1 ... and b of each output.
     pub(crate) regression: Vec<Regression>,
-    /// Before them, what several outputs see together of noise at the inputs of the plant.
+    /// Before them, what up to seven outputs see together of noise at the inputs of the plant.
     pub(crate) joint: Option<Arc<Joint>>,
     /// Inverse of the Cholesky factor of Lambda, lower triangular, p x p; of many outputs that of its diagonal.
     pub(crate) root: Mat<f64>,
@@ -58,7 +58,7 @@ impl Noise {
     ) -> Self {
         let (p, samples) = (spectra.outputs, spectra.samples());
         let behind = |rest: &[Vec<c64>]| autoregression(spectra, rest, largest_order);
-        if p > 1 && !separable(p) {
+        if !separable(p) {
             return Noise::fit_together(spectra, residuals, (largest_order, coloured), model);
         }
         let log = (samples.max(2) as f64).ln();
@@ -69,7 +69,7 @@ impl Noise {
             // The size of noise at the inputs first as if white noise were left, then with the autoregression that is.
             let (mut best, mut least, mut known) = (None, least - log, Regression::default());
             for _ in 0..SIZES {
-                let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known), coloured) else { break };
+                let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known)) else { break };
                 let rest = driven.rest(spectra, &own);
                 let (noise, criterion) = behind(&rest);
                 if criterion >= least {
@@ -85,13 +85,11 @@ impl Noise {
         };
         let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise::of(spectra, (regression, None), &rest);
-        if separable(p) {
-            noise.set_independent();
-        }
+        noise.set_independent();
         noise
     }
 
-    /// The same of several outputs, which see noise at the inputs together.
+    /// The same of up to seven outputs, which see noise at the inputs together.
     fn fit_together(
         spectra: &Spectra,
         residuals: &[Vec<c64>],
@@ -121,10 +119,10 @@ impl Noise {
         best
     }
 
-    /// Noise at the inputs that several outputs see together, also where autoregressions alone describe the residuals better.
+    /// Noise at the inputs that up to seven outputs see together, also where autoregressions alone describe the residuals better.
     pub(crate) fn at_inputs(spectra: &Spectra, residuals: &[Vec<c64>], order: usize, model: &Model) -> Option<Self> {
         let p = spectra.outputs;
-        if p == 1 || separable(p) || model.blocks.is_empty() {
+        if separable(p) || model.blocks.is_empty() {
             return None;
         }
         let bins = Bins::new(model, spectra, residuals);
@@ -247,11 +245,7 @@ impl Noise {
 
     /// What enters at the inputs, where all outputs see it together.
     pub(crate) fn entry(&self) -> Option<&Entry> {
-        let alone = match self.regression.as_slice() {
-            [one] => one.driven.as_ref().map(|driven| &driven.kalman),
-            _ => None,
-        };
-        self.joint.as_ref().map(|joint| &joint.kalman).or(alone).map(|kalman| &kalman.entry)
+        self.joint.as_ref().map(|joint| &joint.kalman.entry)
     }
 
     /// Whether the plant shapes it at an output.

@@ -19,8 +19,7 @@
 
 use super::gains::hidden;
 use super::kalman::{System, diagonal};
-use super::{Driven, Kalman, longest};
-use crate::identify::likelihood::data::lanes::Lanes;
+use super::{Kalman, longest};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::chart::Chart;
@@ -33,8 +32,6 @@ use faer::Mat;
 pub(crate) struct Entering {
     /// The gain K.
     kalman: Kalman,
-    /// The filter `1 / H` of a single output.
-    alone: Option<Driven>,
     /// Whether an output sees a state.
     seen: Vec<bool>,
     /// dK of the states of the plant, then of the colours, by parameters, for each output.
@@ -123,14 +120,7 @@ impl Entering {
     pub(crate) fn new(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> Option<Self> {
         let hidden = hidden(model, longest(spectra), 0..model.outputs);
         let entry = noise.entry()?.clone();
-        let (alone, kalman) = match model.outputs {
-            1 => {
-                let driven = Driven::of_entry(model, &hidden, (0, entry))?;
-                let kalman = driven.kalman.clone();
-                (Some(driven), kalman)
-            }
-            p => (None, Kalman::new(model, &hidden, (0..p, entry))?.0),
-        };
+        let kalman = Kalman::new(model, &hidden, (0..model.outputs, entry))?.0;
         let (m, n, p) = (model.inputs, model.order(), model.outputs);
         let of_block = |k: usize| std::iter::repeat_n(!hidden.contains(&k), model.blocks[k].states);
         let seen: Vec<bool> = (0..model.blocks.len()).flat_map(of_block).collect();
@@ -173,15 +163,7 @@ impl Entering {
             (0..m).for_each(|j| change.a[(of_plant + j, of_plant + j)] = 1.0);
             put(&mut by_entry, of_colour, &change)?;
         }
-        Some(Entering { kalman, alone, seen, slopes, by_entry })
-    }
-
-    /// `epsilon` of a single output, the residual behind `1 / H`.
-    #[inline(always)]
-    pub(crate) fn innovation(&self, residual: &mut Lanes, back: &Lanes) {
-        if let Some(driven) = &self.alone {
-            driven.apply_unmirrored(back, residual);
-        }
+        Some(Entering { kalman, seen, slopes, by_entry })
     }
 
     /// Pole of the colour.

@@ -19,8 +19,8 @@ pub(crate) struct Entry {
 
 impl Entry {
     /// Noise of equal size at all inputs that one output sees: lambda beside a sensor of unit noise.
-    pub(crate) fn of_one(ratio: f64, inputs: usize, colour: Option<f64>) -> Self {
-        Entry { inputs: vec![ratio; inputs], sensors: vec![1.0], colour }
+    pub(crate) fn of_one(ratio: f64, inputs: usize) -> Self {
+        Entry { inputs: vec![ratio; inputs], sensors: vec![1.0], colour: None }
     }
 
     /// lambda of one output.

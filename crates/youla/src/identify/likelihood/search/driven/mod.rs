@@ -7,7 +7,7 @@
 //! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
 //! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
 //!
-//! Several outputs see the same noise, so that one Kalman filter has them together ([`joint`]); of many outputs each has its own.
+//! Up to seven outputs see the same noise, so that one Kalman filter has them together ([`joint`]); of more each has its own, as here.
 //!
 //! Torque that changes slowly has a colour, `w = e / (z - c)`: one state for each input behind white noise. An autoregression of the whole would
 //! take dozens of coefficients for it, and in a loop a wrong plant takes fewer.
@@ -26,7 +26,6 @@ pub(crate) use kalman::{Entry, Kalman};
 pub(crate) use sizes::Bins;
 
 use super::model::Model;
-use super::separable::separable;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes};
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use crate::linalg::eigenvalues;
@@ -44,8 +43,6 @@ const GROWTH: f64 = 2.0;
 pub(crate) struct Driven {
     /// Quadratics of the numerator and denominator: `(1 + c_1 / z + c_2 / z^2) / (1 + d_1 / z + d_2 / z^2)`.
     sections: Vec<[f64; 4]>,
-    /// Those of the numerator with the poles outside of the unit circle where they are.
-    over: Vec<[f64; 2]>,
     /// Its Kalman filter, over whose `unstable` the filter is smaller: it mirrors the poles outside of the unit circle.
     pub(crate) kalman: Kalman,
     /// A of the model.
@@ -62,32 +59,24 @@ impl Driven {
         (spectra, gains): (&Spectra, &Gains),
         residual: &[Vec<c64>],
         (output, behind): (usize, &Regression),
-        coloured: bool,
     ) -> Option<Self> {
         let samples = spectra.samples() as f64;
         let poles = model.poles();
-        let grows = || poles.iter().any(|p| p.norm().ln() > GROWTH / samples);
-        if poles.is_empty() || separable(spectra.outputs) && grows() {
+        if poles.is_empty() || poles.iter().any(|p| p.norm().ln() > GROWTH / samples) {
             return None;
         }
-        let (ratio, colour) = size::entry((spectra, gains), residual, (output, behind), coloured)?;
-        let entry = Entry::of_one(ratio, model.inputs, colour);
-        Driven::of_entry(model, &gains.hidden[output], (output, entry))
-    }
-
-    /// Noise of a known size and colour at the inputs, without the blocks that are hidden from the output.
-    pub(crate) fn of_entry(model: &Model, hidden: &[usize], (output, entry): (usize, Entry)) -> Option<Self> {
-        let colour = entry.colour;
-        let (kalman, closed) = Kalman::new(model, hidden, (output..output + 1, entry))?;
+        let ratio = size::ratio((spectra, gains), residual, (output, behind))?;
+        // Blocks that are hidden from the output have no part in its filter.
+        let hidden = &gains.hidden[output];
+        let (kalman, closed) = Kalman::new(model, hidden, (output..output + 1, Entry::of_one(ratio, model.inputs)))?;
         let zeros = eigenvalues("the noise", closed.as_ref()).ok()?;
         let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
-        let colours = colour.map_or(Vec::new(), |pole| vec![c64::new(pole, 0.0); model.inputs]);
-        let poles = [model.without(hidden).poles(), colours].concat();
-        let [inside, over, under] = [poles.iter().copied().map(mirrored).collect(), poles, zeros].map(quadratics);
-        let sections = inside.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
+        let poles = model.without(hidden).poles().into_iter().map(mirrored).collect();
+        let [over, under] = [poles, zeros].map(quadratics);
+        let sections = over.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
         let (a, _, c) = model.matrices();
         let c = c.subrows(output, 1).to_owned();
-        Some(Driven { sections, over, kalman, a, c })
+        Some(Driven { sections, kalman, a, c })
     }
 
     /// Number of its parameters.
@@ -98,21 +87,10 @@ impl Driven {
     /// Multiplies by `1 / H_i`, poles outside of the unit circle mirrored, given `1 / z`.
     #[inline(always)]
     pub(crate) fn apply(&self, back: &Lanes, to: &mut Lanes) {
-        self.apply_sections(self.sections.iter().map(|[c1, c2, ..]| [*c1, *c2]), back, to);
-    }
-
-    /// The same with the poles where they are.
-    #[inline(always)]
-    pub(super) fn apply_unmirrored(&self, back: &Lanes, to: &mut Lanes) {
-        self.apply_sections(self.over.iter().copied(), back, to);
-    }
-
-    #[inline(always)]
-    fn apply_sections(&self, over: impl Iterator<Item = [f64; 2]>, back: &Lanes, to: &mut Lanes) {
         let mut under = Lanes::ZERO;
         under.re.fill(1.0);
-        for (over, [_, _, d1, d2]) in over.zip(&self.sections) {
-            multiply(to, back, over);
+        for [c1, c2, d1, d2] in &self.sections {
+            multiply(to, back, [*c1, *c2]);
             multiply(&mut under, back, [*d1, *d2]);
         }
         to.multiply(&under.inverse());

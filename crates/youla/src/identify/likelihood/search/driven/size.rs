@@ -1,4 +1,4 @@
-//! The most likely size and colour of noise at the inputs.
+//! The most likely size of noise at the inputs, of one output.
 
 use super::gains::{Gains, LINES};
 use crate::identify::likelihood::data::spectra::Spectra;
@@ -9,37 +9,15 @@ use faer::c64;
 const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 /// A product from which the next factor might lead out of the range of numbers.
 const LARGE: f64 = 1e100;
-/// Poles c of noise with a colour that are tried, with corners 1 - c from 0.1 down to 1e-4 rad per sample, a factor of 3 apart. Chosen: of those
-/// between two the autoregression describes what is left.
-pub(super) const COLOURS: [f64; 6] = [0.9, 0.97, 0.99, 0.997, 0.999, 0.9999];
 
-/// Size lambda and colour of such noise in the residual of an output, with an autoregression behind it; `None` where white noise alone has the lesser
-/// criterion of Schwarz.
-pub(super) fn entry(
+/// Size lambda of such noise in the residual of an output, with an autoregression behind it; `None` where white noise alone has the lesser criterion
+/// of Schwarz.
+pub(super) fn ratio(
     (spectra, gains): (&Spectra, &Gains),
     residual: &[Vec<c64>],
     (output, behind): (usize, &Regression),
-    coloured: bool,
-) -> Option<(f64, Option<f64>)> {
-    let samples = spectra.samples() as f64;
-    let mut lines = lines((spectra, gains), residual, (output, behind));
-    let (mut least, ratio) = size(&lines, samples);
-    let mut best = (ratio?, None);
-    if coloured {
-        let back: Vec<c64> =
-            spectra.records.iter().flat_map(|lines| lines.z.iter().step_by(gains.every).map(|z| z.conj())).collect();
-        let white: Vec<f64> = lines.iter().map(|line| line[2]).collect();
-        for pole in COLOURS {
-            let shape = |back: &c64| 1.0 / (c64::ONE - back * pole).norm_sqr();
-            lines.iter_mut().zip(&white).zip(&back).for_each(|((line, gain), back)| line[2] = gain * shape(back));
-            if let (cost, Some(ratio)) = size(&lines, samples)
-                && cost < least - samples.ln()
-            {
-                (least, best) = (cost, (ratio, Some(pole)));
-            }
-        }
-    }
-    Some(best)
+) -> Option<f64> {
+    size(&lines((spectra, gains), residual, (output, behind)), spectra.samples() as f64).1
 }
 
 /// Of some of the lines how many of the full circle each stands for, power of the residual of these behind an autoregression, and `|G_i|^2`.

@@ -10,7 +10,7 @@
 
 use super::gains::{LINES, Responses, hidden, longest};
 use super::kalman::Entry;
-use super::size::{COLOURS, size};
+use super::size::size;
 use crate::identify::likelihood::data::lanes::Lanes;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::autoregression::Regression;
@@ -21,6 +21,10 @@ use faer::prelude::*;
 use faer::{Mat, Side, c64};
 use pulp::Arch;
 use std::f64::consts::PI;
+
+/// Poles c of noise with a colour from which the most likely one is sought, with corners 1 - c from 0.1 down to 1e-4 rad per sample, a factor of 3
+/// apart.
+const COLOURS: [f64; 6] = [0.9, 0.97, 0.99, 0.997, 0.999, 0.9999];
 
 /// Width of a bin over its frequency and largest width, rad per sample: enough for a few variances.
 const RELATIVE_WIDTH: f64 = 0.125;

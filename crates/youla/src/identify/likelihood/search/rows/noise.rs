@@ -34,15 +34,12 @@ impl Rows {
             }
             first += s;
         }
-        match &self.joint {
-            Some(joint) => {
-                for (j, end) in place.ends.iter().enumerate() {
-                    let by = |o| joint.driven((o, j), ends);
-                    self.innovations.iter_mut().enumerate().for_each(|(o, v)| v.add_scaled(&by(o), -end));
-                }
-                joint.apply(&mut self.innovations, 1, &mut self.unfiltered);
+        if let Some(joint) = &self.joint {
+            for (j, end) in place.ends.iter().enumerate() {
+                let by = |o| joint.driven((o, j), ends);
+                self.innovations.iter_mut().enumerate().for_each(|(o, v)| v.add_scaled(&by(o), -end));
             }
-            None => entering.innovation(&mut self.innovations[0], &z.conj()),
+            joint.apply(&mut self.innovations, 1, &mut self.unfiltered);
         }
         self.entered.fill(Lanes::ZERO);
         if let Some(pole) = entering.colour() {

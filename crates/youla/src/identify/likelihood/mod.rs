@@ -29,6 +29,8 @@ mod many_records;
 mod measured;
 #[cfg(test)]
 mod noise_at_inputs;
+#[cfg(test)]
+mod noise_by_own_path;
 mod options;
 mod recommendation;
 pub(super) mod search;
@@ -188,9 +190,8 @@ impl Records<'_> {
         let (known, time) = (self.known, self.time);
         let (estimation, verification) = (found.records(0, self.all.experiments), found.records(1, self.verification));
         let (problem, verification) = (found.problem(self.all, &estimation), verification.as_slice());
-        let solution = &found.solution;
-        let choice = &solution.chosen;
-        let spectra = problem.spectra(&choice.delays);
+        let (solution, spectra) = problem.with_own_noise(&found.solution);
+        let (solution, choice) = (&solution, &solution.chosen);
         let shares = [deviation::slow(spectra.samples()), deviation::grid(spectra.samples())].concat();
         let parts = Parts::new(&problem, solution, verification);
         let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
@@ -313,6 +314,7 @@ fn problem<'a>(
         largest_order: options.largest_order,
         masked: Vec::new(),
         feedback: stated.and_then(|known| known.feedback).filter(|k| !k.is_zero()),
+        filter_moves: false,
         watched: false,
         deadline: options.time_limit.map(Deadline::after),
     })

@@ -45,7 +45,7 @@ fn record(at_input: f64, at_output: f64, seed: u64) -> (Mat<f64>, Mat<f64>) {
     (u.clone(), simulate(&machine(0.98), (u + w).as_ref(), &[0.0; 3]).unwrap() + e)
 }
 
-fn unscaled(u: &Mat<f64>, y: &Mat<f64>) -> Spectra {
+pub(super) fn unscaled(u: &Mat<f64>, y: &Mat<f64>) -> Spectra {
     let sizes = Sizes { u: vec![1.0], y: vec![1.0] };
     Spectra::new(&[Experiment::new(u.as_ref(), y.as_ref())], &sizes, &[0], 0)
 }
@@ -186,7 +186,7 @@ fn covariance(spectra: &Spectra, point: &Point, noise: &Noise) -> Mat<f64> {
 }
 
 /// The inverse of H at a line.
-fn whitener(noise: &Noise, z: c64) -> Mat<c64> {
+pub(super) fn whitener(noise: &Noise, z: c64) -> Mat<c64> {
     let p = noise.regression.len();
     let mut filters = vec![c64::ZERO; p];
     noise.filters(z, &mut filters);
@@ -216,7 +216,7 @@ fn entering(model: &Model, mut noise: Noise, entry: driven::Entry) -> Noise {
 
 /// Of a test of one output and two.
 fn entry(outputs: usize, colour: Option<f64>) -> driven::Entry {
-    driven::Entry { inputs: vec![0.7], sensors: [1.0, 0.4][..outputs].to_vec(), colour }
+    driven::Entry { inputs: vec![0.7], sensors: [1.0, 0.4][..outputs].to_vec(), colour, free: Vec::new() }
 }
 
 /// Slopes by the rows whose filter moves, against central differences: a stable and an unstable plant, white noise and noise with a colour,

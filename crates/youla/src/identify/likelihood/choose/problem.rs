@@ -124,6 +124,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) masked: Vec<Mask>,
     /// The feedback that ran, where it explains the log: what it does not stabilise is not the plant.
     pub(crate) feedback: Option<&'a StateSpace<Discrete>>,
+    /// Whether the filter of noise at the input of one output moves in every search: else in the last one alone.
+    pub(crate) filter_moves: bool,
     /// Whether the walk stops at a model with several modes that the inputs hardly move.
     pub(crate) watched: bool,
     /// When the search for a better model ends.
@@ -158,7 +160,7 @@ impl Problem<'_> {
             aim,
             direct,
             radius,
-            filter_moves: false,
+            filter_moves: self.filter_moves,
         }
     }
 

@@ -7,6 +7,8 @@ use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use super::wide;
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::free_gain::with_free_gain;
 use crate::identify::likelihood::search::{SearchOptions, search, with_best_ends, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
@@ -27,6 +29,8 @@ const WRONG_DELAY: f64 = 60.0;
 /// Distance of an unstable pole of a loop from the poles of the plant, over its distance from the unit circle, from which the feedback moves it.
 /// Loops that lack one of several slow modes have 15 to 30.
 const MOVED: f64 = 5.0;
+/// Coefficients of the noise up to which it is that of the outputs: a pole and a zero describe drift.
+const FEW: usize = 3;
 /// Differences of the criterion of rivals up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 
@@ -67,6 +71,7 @@ impl Problem<'_> {
         if self.stops_at(&at) {
             return Some(Solution { chosen: at, rivals: Vec::new(), samples });
         }
+        let here = here.with_moving_filter(&mut tried, &mut at, table)?;
         here.walk_through_unstable(&mut tried, &at, rounds, table);
         here.integrating(&mut tried, &at, table);
         if best(&tried)?.criterion < at.criterion {
@@ -79,7 +84,7 @@ impl Problem<'_> {
             at = here.improved(&mut tried, rounds, table)?;
         }
         if self.direct.is_some() && !now {
-            let wider = self.with_feedthrough(true);
+            let wider = here.with_feedthrough(true);
             // a dead time that the record does not tell from none hides what acts in the same sample
             let at_once = tried.iter().filter(|c| c.delays.iter().all(|d| *d == 0) && c.delays != at.delays);
             let at_once = at_once.min_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -90,7 +95,7 @@ impl Problem<'_> {
             }
         }
         if samples <= LONG {
-            let last = self.with_feedthrough(at.found.feedthrough);
+            let last = here.with_feedthrough(at.found.feedthrough);
             last.smaller_along_delays(&mut tried, &at, table);
             if best(&tried)?.criterion < at.criterion {
                 at = last.improved(&mut tried, rounds, table)?;
@@ -119,6 +124,49 @@ impl Problem<'_> {
         let least = tried.iter().map(|c| c.as_rival(samples)).fold(f64::INFINITY, f64::min);
         let rivals = tried.into_iter().filter(|c| c.as_rival(samples) <= least + BESIDE).collect();
         Some(Solution { chosen, rivals, samples })
+    }
+
+    /// The model with noise by paths of its own where the records ask for it, and their lines.
+    pub(crate) fn with_own_noise(&self, solution: &Solution) -> (Solution, Spectra) {
+        let chosen = &solution.chosen;
+        let spectra = self.spectra(&chosen.delays);
+        let freed = self.freed(&spectra, chosen).unwrap_or_else(|| chosen.clone());
+        (Solution { chosen: freed, ..solution.clone() }, spectra)
+    }
+
+    /// A model with such noise; `None` where the criterion is not less, and where the feedback does not stabilise it.
+    fn freed(&self, spectra: &Spectra, choice: &Choice) -> Option<Choice> {
+        let found = with_free_gain(spectra, &choice.found, &self.options(20, 0.01, &choice.delays))?;
+        let freed = Choice { found, ..choice.clone() };
+        (self.unstable_poles(&freed).is_empty() || !choice.stabilised()).then_some(freed)
+    }
+
+    /// The criterion of a model with such noise where that is less.
+    fn with_free_noise(&self, choice: &Choice) -> f64 {
+        let spectra = self.spectra(&choice.delays);
+        let freed = self.freed(&spectra, choice).map(|freed| freed.found.criterion(spectra.samples()));
+        freed.map_or(choice.criterion, |criterion| criterion.min(choice.criterion))
+    }
+
+    /// With a filter that moves in every search, where that of the noise at the input of one output leads to a better model: from long regressions
+    /// searches end at worse models with it for some records, without it for others.
+    fn with_moving_filter(self, tried: &mut Vec<Choice>, at: &mut Choice, table: &mut Vec<Candidate>) -> Option<Self> {
+        if self.outputs() > 1 || at.found.noise.parameters() <= FEW {
+            return Some(self);
+        }
+        let (moving, long) = (Problem { filter_moves: true, ..self.clone() }, self.samples().0 > LONG);
+        let same = Task { origin: "the same with a filter that moves".into(), ..moving.same(at) };
+        let mut found = moving.run(vec![same], f64::INFINITY, table);
+        if !long {
+            found.extend(moving.regressed(table));
+        }
+        let better = moving.improved(&mut found, if long { 1 } else { ROUNDS }, table)?;
+        if moving.with_free_noise(&better) >= self.with_free_noise(at) - 0.5 {
+            return Some(self);
+        }
+        tried.extend(found);
+        *at = better;
+        Some(moving)
     }
 
     /// Models one step away as long as the criterion falls.

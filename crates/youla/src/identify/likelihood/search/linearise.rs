@@ -71,6 +71,11 @@ pub(crate) fn linearise_quickly(
     linearise_with(spectra, point, chart, noise, &Extra { count: 0, values: &[], quick: true, filter })
 }
 
+/// The same for a step of a search, with columns of the coefficients of the noise behind those of the parameters.
+pub(crate) fn linearise_free(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Linearised {
+    linearise_all(spectra, point, (chart, noise), &Extra { count: 0, values: &[], quick: true, filter: Filter::Free }).0
+}
+
 /// The same with further columns behind those of the parameters.
 pub(crate) fn linearise_with(
     spectra: &Spectra,
@@ -79,6 +84,17 @@ pub(crate) fn linearise_with(
     noise: &Noise,
     extra: &Extra<'_>,
 ) -> Linearised {
+    let (Linearised { factor, ends }, of_noise) = linearise_all(spectra, point, (chart, noise), extra);
+    Linearised { factor: without(factor, of_noise), ends }
+}
+
+/// The same, and which columns are those of the coefficients of the noise.
+fn linearise_all(
+    spectra: &Spectra,
+    point: &Point,
+    (chart, noise): (&Chart, &Noise),
+    extra: &Extra<'_>,
+) -> (Linearised, Range<usize>) {
     let coefficients = extra.filter == Filter::Free && noise.parameters() <= MOST_COEFFICIENTS;
     let of_noise = if coefficients { noise.parameters() } else { 0 };
     let n = point.model.end_count();
@@ -112,11 +128,11 @@ pub(crate) fn linearise_with(
         let rest = r.submatrix(n.min(r.nrows()), n, below, width);
         factor = if factor.nrows() == 0 { rest.to_owned() } else { compressed(&stacked(&factor, &rest.to_owned())) };
     }
-    Linearised { factor: without(factor, chart.parameters()..chart.parameters() + of_noise), ends }
+    (Linearised { factor, ends }, chart.parameters()..chart.parameters() + of_noise)
 }
 
 /// Coefficients of the noise of all outputs that have columns at most: the work grows with the square of their number.
-const MOST_COEFFICIENTS: usize = 100;
+pub(crate) const MOST_COEFFICIENTS: usize = 100;
 
 /// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N.
 pub(crate) fn without(factor: Mat<f64>, columns: Range<usize>) -> Mat<f64> {

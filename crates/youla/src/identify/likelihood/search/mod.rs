@@ -15,6 +15,7 @@ pub(crate) mod chart;
 pub(crate) mod driven;
 pub(crate) mod driven_slope;
 pub(crate) mod feedthrough;
+pub(crate) mod free_gain;
 pub(crate) mod grouping;
 pub(crate) mod groups;
 pub(crate) mod linearise;

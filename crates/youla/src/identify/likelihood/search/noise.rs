@@ -132,7 +132,7 @@ impl Noise {
     }
 
     /// With the autoregression of each output behind what it makes of noise at its inputs, lines x p.
-    fn behind(spectra: &Spectra, rest: &[Vec<c64>], order: usize, joint: Option<Arc<Joint>>) -> Self {
+    pub(crate) fn behind(spectra: &Spectra, rest: &[Vec<c64>], order: usize, joint: Option<Arc<Joint>>) -> Self {
         let of = |i: usize| {
             let own = of_output(rest, (i, spectra.outputs));
             (autoregression(spectra, &own, order).0, own)

@@ -120,6 +120,9 @@ impl Entering {
     pub(crate) fn new(spectra: &Spectra, model: &Model, chart: &Chart, noise: &Noise) -> Option<Self> {
         let hidden = hidden(model, longest(spectra), 0..model.outputs);
         let entry = noise.entry()?.clone();
+        if !entry.free.is_empty() {
+            return Some(Entering::free(noise.joint.as_ref()?.kalman.clone(), model, chart));
+        }
         let kalman = Kalman::new(model, &hidden, (0..model.outputs, entry))?.0;
         let (m, n, p) = (model.inputs, model.order(), model.outputs);
         let of_block = |k: usize| std::iter::repeat_n(!hidden.contains(&k), model.blocks[k].states);
@@ -164,6 +167,19 @@ impl Entering {
             put(&mut by_entry, of_colour, &change)?;
         }
         Some(Entering { kalman, seen, slopes, by_entry })
+    }
+
+    /// Of gains that are free: they stay where the plant moves.
+    fn free(kalman: Kalman, model: &Model, chart: &Chart) -> Self {
+        let (n, m, p) = (model.order(), model.inputs, model.outputs);
+        let free = &kalman.entry.free;
+        let seen = (0..n).map(|state| free.contains(&state)).collect();
+        let places: Vec<usize> = free.iter().copied().chain(n..n + kalman.of_colour.nrows()).collect();
+        let mut by_entry = vec![Mat::<f64>::zeros(n + m, kalman.entry.parameters()); p];
+        for (which, (state, o)) in places.iter().flat_map(|state| (0..p).map(move |o| (*state, o))).enumerate() {
+            by_entry[o][(state, which)] = 1.0;
+        }
+        Entering { kalman, seen, slopes: vec![Mat::zeros(n + m, chart.parameters()); p], by_entry }
     }
 
     /// Pole of the colour.

@@ -16,7 +16,7 @@ const UNSEEN: f64 = 1e-8;
 /// to 0.1.
 pub(crate) const NARROW: f64 = 0.3;
 /// About how many lines show the size of the noise.
-pub(super) const LINES: usize = 6000;
+pub(crate) const LINES: usize = 6000;
 
 /// `|G_i|^2` of the blocks that an output sees, on some of the lines.
 pub(crate) struct Gains {
@@ -78,13 +78,13 @@ pub(crate) fn longest(spectra: &Spectra) -> f64 {
 }
 
 /// The responses of the blocks that an output sees, p x m, at some lines, with the widest instructions that the processor has.
-pub(super) struct Responses<'a, F> {
-    pub(super) blocks: &'a [Block],
-    pub(super) inputs: usize,
-    pub(super) hidden: &'a [Vec<usize>],
-    pub(super) z: &'a [c64],
+pub(crate) struct Responses<'a, F> {
+    pub(crate) blocks: &'a [Block],
+    pub(crate) inputs: usize,
+    pub(crate) hidden: &'a [Vec<usize>],
+    pub(crate) z: &'a [c64],
     /// Takes the place of a line, and its response as one of the lanes.
-    pub(super) each: F,
+    pub(crate) each: F,
 }
 
 impl<F: FnMut(usize, (&[Lanes], usize))> NullaryFnOnce for Responses<'_, F> {

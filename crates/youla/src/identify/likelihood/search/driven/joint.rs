@@ -48,7 +48,20 @@ impl Joint {
 
     /// Noise of known variances and colour, without the blocks that are hidden from all outputs.
     pub(crate) fn of_entry(model: &Model, hidden: &[usize], entry: Entry) -> Option<Self> {
-        let (kalman, _) = Kalman::new(model, hidden, (0..model.outputs, entry))?;
+        Joint::of_filter(model, hidden, Kalman::new(model, hidden, (0..model.outputs, entry))?.0)
+    }
+
+    /// The same with gains that are free, the pole of the colours, and about the covariance of the innovations.
+    pub(crate) fn of_gain(
+        model: &Model,
+        hidden: &[usize],
+        gain: (Mat<f64>, Option<f64>),
+        size: &Mat<f64>,
+    ) -> Option<Self> {
+        Joint::of_filter(model, hidden, Kalman::of_gain(model, hidden, gain, size)?)
+    }
+
+    fn of_filter(model: &Model, hidden: &[usize], kalman: Kalman) -> Option<Self> {
         let mut blocks = Vec::with_capacity(model.blocks.len());
         let mut states = 0..0;
         for (place, block) in model.blocks.iter().enumerate() {

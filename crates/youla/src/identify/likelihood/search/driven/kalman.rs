@@ -1,7 +1,7 @@
 //! The Kalman filter of outputs that see noise at the inputs of a plant.
 
 use crate::identify::likelihood::search::model::Model;
-use crate::linalg::{RiccatiProblem, block, dare};
+use crate::linalg::{RiccatiProblem, block, dare, eigenvalues};
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Scale, c64};
 use std::ops::Range;
@@ -15,12 +15,14 @@ pub(crate) struct Entry {
     pub(crate) sensors: Vec<f64>,
     /// c.
     pub(crate) colour: Option<f64>,
+    /// The states whose gains are free in place of variances.
+    pub(crate) free: Vec<usize>,
 }
 
 impl Entry {
     /// Noise of equal size at all inputs that one output sees: lambda beside a sensor of unit noise.
     pub(crate) fn of_one(ratio: f64, inputs: usize) -> Self {
-        Entry { inputs: vec![ratio; inputs], sensors: vec![1.0], colour: None }
+        Entry { inputs: vec![ratio; inputs], sensors: vec![1.0], colour: None, free: Vec::new() }
     }
 
     /// lambda of one output.
@@ -31,6 +33,9 @@ impl Entry {
     /// What of the variances is free, as changes of those at the inputs and of those of the sensors.
     pub(crate) fn directions(&self) -> Vec<[Vec<f64>; 2]> {
         let (m, p) = (self.inputs.len(), self.sensors.len());
+        if !self.free.is_empty() {
+            return Vec::new();
+        }
         let unit = |count: usize, at: Option<usize>| (0..count).map(|i| f64::from(at == Some(i))).collect();
         if p == 1 {
             return vec![[vec![1.0; m], vec![0.0]]];
@@ -41,6 +46,10 @@ impl Entry {
 
     /// Number of its parameters.
     pub(crate) fn parameters(&self) -> usize {
+        if !self.free.is_empty() {
+            let colours = self.colour.map_or(0, |_| self.inputs.len());
+            return (self.free.len() + colours) * self.sensors.len() + usize::from(self.colour.is_some());
+        }
         let sizes = if self.sensors.len() == 1 { 1 } else { self.inputs.len() + self.sensors.len() - 1 };
         sizes + usize::from(self.colour.is_some())
     }
@@ -123,6 +132,34 @@ impl Kalman {
 }
 
 impl Kalman {
+    /// Of gains that are free but for the states of hidden blocks, those of the model, then those of the colours; `None` where `A - K C` is not
+    /// stable.
+    pub(super) fn of_gain(
+        model: &Model,
+        hidden: &[usize],
+        (gain, colour): (Mat<f64>, Option<f64>),
+        size: &Mat<f64>,
+    ) -> Option<Self> {
+        let (n, m, p) = (model.order(), model.inputs, gain.ncols());
+        let (System { a, c, .. }, own) =
+            (System::new(&model.without(hidden), 0..p, colour), rows_of(model, hidden, &gain));
+        let zeros = eigenvalues("the noise", (a - own * c).as_ref()).ok()?;
+        if zeros.iter().any(|zero| zero.norm() >= 1.0) {
+            return None;
+        }
+        let unstable = model.without(hidden).poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
+        let free = states_of(model, hidden);
+        let entry = Entry { inputs: vec![1.0; m], sensors: vec![1.0; p], colour, free };
+        let (covariance, size, b) = (Mat::zeros(0, 0), size.clone(), model.matrices().1);
+        let of_colour = gain.subrows(n, gain.nrows() - n).to_owned();
+        Some(Kalman { entry, gain: gain.subrows(0, n).to_owned(), b, of_colour, covariance, size, unstable })
+    }
+
+    /// The gains of the states of the model, then those of the colours.
+    pub(crate) fn gains(&self) -> Mat<f64> {
+        block(&[&[self.gain.as_ref()], &[self.of_colour.as_ref()]])
+    }
+
     /// Inverse of the covariance of the innovations, S = C P C' + R.
     pub(super) fn precision(&self) -> Mat<f64> {
         self.size.partial_piv_lu().inverse()
@@ -131,4 +168,47 @@ impl Kalman {
 
 pub(super) fn diagonal(values: &[f64]) -> Mat<f64> {
     Mat::from_fn(values.len(), values.len(), |i, j| if i == j { values[i] } else { 0.0 })
+}
+
+/// The states of a model without those of some blocks.
+pub(crate) fn states_of(model: &Model, hidden: &[usize]) -> Vec<usize> {
+    let mut first = 0;
+    let mut of_block = |k: usize| {
+        let states = first..first + model.blocks[k].states;
+        first = states.end;
+        if hidden.contains(&k) { 0..0 } else { states }
+    };
+    (0..model.blocks.len()).flat_map(&mut of_block).collect()
+}
+
+/// The rows of the states of a model without those of some blocks, and those behind them.
+pub(crate) fn places_of(model: &Model, hidden: &[usize], rows: usize) -> Vec<usize> {
+    states_of(model, hidden).into_iter().chain(model.order()..rows).collect()
+}
+
+fn rows_of(model: &Model, hidden: &[usize], gain: &Mat<f64>) -> Mat<f64> {
+    let places = places_of(model, hidden, gain.nrows());
+    Mat::from_fn(places.len(), gain.ncols(), |i, o| gain[(places[i], o)])
+}
+
+/// The gains of the same spectrum for which `A - K C` is stable, by the Riccati equation of `K epsilon` with innovations of a covariance.
+pub(crate) fn stabilised(
+    model: &Model,
+    hidden: &[usize],
+    (mut gain, colour): (Mat<f64>, Option<f64>),
+    size: &Mat<f64>,
+) -> Option<Mat<f64>> {
+    let System { a, c, .. } = System::new(&model.without(hidden), 0..gain.ncols(), colour);
+    let own = rows_of(model, hidden, &gain);
+    let zeros = eigenvalues("the noise", (&a - &own * &c).as_ref()).ok()?;
+    if zeros.iter().all(|zero| zero.norm() < 1.0) {
+        return Some(gain);
+    }
+    let (q, s) = (&own * size * own.transpose(), &own * size);
+    let (a, b, s) = (a.transpose(), c.transpose(), Some(s.as_ref()));
+    let dual = RiccatiProblem { a, b, q: q.as_ref(), r: size.as_ref(), s };
+    let own = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
+    let places = places_of(model, hidden, gain.nrows());
+    places.iter().enumerate().for_each(|(i, place)| gain.row_mut(*place).copy_from(own.row(i)));
+    Some(gain)
 }

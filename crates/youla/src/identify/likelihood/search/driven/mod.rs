@@ -20,9 +20,9 @@ mod size;
 mod sizes;
 
 use super::autoregression::Regression;
-pub(crate) use gains::{Gains, NARROW, has_line, is_line, longest};
+pub(crate) use gains::{Gains, LINES, NARROW, Responses, has_line, hidden, is_line, longest};
 pub(crate) use joint::Joint;
-pub(crate) use kalman::{Entry, Kalman};
+pub(crate) use kalman::{Entry, Kalman, places_of, stabilised, states_of};
 pub(crate) use sizes::Bins;
 
 use super::model::Model;

@@ -146,7 +146,7 @@ impl Bins {
         }
         let mean = at_inputs.iter().sum::<f64>() / at_inputs.len().max(1) as f64;
         let usable = !at_inputs.is_empty() && mean.is_finite() && sensors.iter().all(|s| *s > 0.0);
-        (total, usable.then(|| Entry { inputs: vec![mean.exp(); m], sensors, colour }))
+        (total, usable.then(|| Entry { inputs: vec![mean.exp(); m], sensors, colour, free: Vec::new() }))
     }
 
     /// The most likely variances of all together.
@@ -192,7 +192,7 @@ impl Bins {
         let mean = sizes[m..m + p].iter().sum::<f64>() / p as f64;
         let of = |range: &[f64]| range.iter().map(|v| (v - mean).exp()).collect();
         let colour = sizes.get(m + p).map(|v| 1.0 - v.exp());
-        Some(Entry { inputs: of(&sizes[..m]), sensors: of(&sizes[m..m + p]), colour })
+        Some(Entry { inputs: of(&sizes[..m]), sensors: of(&sizes[m..m + p]), colour, free: Vec::new() })
     }
 
     /// The cost of logarithms of variances and of the corner of the colour, its slope and Fisher's information; `None` where a spectrum is

@@ -8,6 +8,7 @@ use crate::source::{Format, Source, resolve};
 use crate::time::TimeSource;
 use crate::values::{Value, Variables};
 use std::path::Path;
+use youla::signal::StampSteps;
 
 /// Most columns of a matrix in a file that are listed one by one.
 const MOST_COLUMNS: usize = 64;
@@ -116,10 +117,9 @@ fn column(from: String, values: &[f64]) -> SurveyedColumn {
 }
 
 fn uniform_step(values: &[f64]) -> Option<f64> {
-    let (first, last) = (values.first()?, values.last()?);
-    let step = (last - first) / (values.len().checked_sub(1).filter(|n| *n > 0)? as f64);
-    let even = values.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNIFORM * step);
-    (step > 0.0 && even).then_some(step)
+    let steps = StampSteps::of(values, UNIFORM)?;
+    let even = values.windows(2).all(|pair| (pair[1] - pair[0] - steps.mean).abs() <= steps.slack);
+    (steps.mean > 0.0 && even).then_some(steps.mean)
 }
 
 #[cfg(test)]

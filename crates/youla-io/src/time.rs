@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use youla::error::Seconds;
 use youla::lti::Discrete;
+use youla::signal::StampSteps;
 
 /// Where the sample time comes from; one of `column` and `ts` at least.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -142,35 +143,24 @@ impl TimeSource {
     }
 
     fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
-        let middle = median_step(times);
-        require_rising(what, times, middle)?;
-        if let Some(ts) = declared {
-            let time = Discrete::new(ts)?;
-            if (middle - ts).abs() > self.tolerance * ts {
-                let what = format!("{what}, declared sample time and time column");
-                return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: ts, right: middle }));
-            }
-            return Ok(Clock { time, parts: self.parts(what, times, ts)? });
+        let Some(steps) = StampSteps::of(times, self.tolerance) else {
+            return Err(Error::SampleTimeMissing { what: what.to_owned() });
+        };
+        require_rising(what, times, steps.median)?;
+        let ts = declared.unwrap_or(steps.mean);
+        if (steps.mean - ts).abs() > self.tolerance * ts {
+            let what = format!("{what}, declared sample time and time column");
+            return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: ts, right: steps.mean }));
         }
-        let parts = self.parts(what, times, middle)?;
-        let ends = parts.iter().skip(1).map(|part| part.0).chain([times.len()]);
-        let ranges = parts.iter().map(|part| part.0).zip(ends);
-        // The longest part gives the most accurate sample time.
-        let (from, to) = ranges.fold((0, 0), |best, r| if r.1 - r.0 > best.1 - best.0 { r } else { best });
-        let ts = if to - from > 1 { mean_step(times[from], times[to - 1], to - from) } else { middle };
-        Ok(Clock { time: Discrete::new(ts)?, parts })
-    }
-
-    fn is_step(&self, dt: f64, ts: f64) -> bool {
-        (dt - ts).abs() <= self.tolerance * ts
+        Ok(Clock { time: Discrete::new(ts)?, parts: self.parts(what, times, ts, steps.slack)? })
     }
 
     /// First row (from 0) and time of each part without gaps.
-    fn parts(&self, what: &str, times: &[f64], ts: f64) -> Result<Vec<(usize, f64)>> {
+    fn parts(&self, what: &str, times: &[f64], ts: f64, slack: f64) -> Result<Vec<(usize, f64)>> {
         let mut parts = vec![(0, times[0])];
         for (k, step) in times.windows(2).enumerate() {
             let dt = step[1] - step[0];
-            match self.is_step(dt, ts) {
+            match (dt - ts).abs() <= slack {
                 true => {}
                 false if self.gaps == Gaps::Split && dt > ts => parts.push((k + 1, step[1])),
                 false => return Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts }),
@@ -182,7 +172,7 @@ impl TimeSource {
 
 /// Refuses stamps of which most repeat, because they lack digits, or fall.
 fn require_rising(what: &str, times: &[f64], middle: f64) -> Result<()> {
-    let mean = mean_step(times[0], times[times.len() - 1], times.len());
+    let mean = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
     let problem = match middle {
         rising if rising > 0.0 => return Ok(()),
         0.0 if mean > 0.0 => format!(
@@ -209,22 +199,6 @@ impl Clock {
     }
 }
 
-/// The step in the middle of all steps, which a gap or a repeated row does not move.
-fn median_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// The mean step, as the shortest decimal number within the rounding of the time column.
-fn mean_step(first: f64, last: f64, samples: usize) -> f64 {
-    let steps = (samples - 1) as f64;
-    let mean = (last - first) / steps;
-    let rounding = 2.0 * f64::EPSILON * (first.abs().max(last.abs()) / steps).max(mean.abs() / 2.0);
-    let rounded = (0..17).filter_map(|digits| format!("{mean:.digits$e}").parse::<f64>().ok());
-    rounded.into_iter().find(|r| (r - mean).abs() <= rounding).unwrap_or(mean)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -241,6 +215,24 @@ mod tests {
         }
         let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
         assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    /// Seconds since 1970 with so many decimals: the rounding of the stamps changes no sample time, and jitter is still jitter.
+    #[test]
+    fn rounding_of_the_stamps_does_not_matter() {
+        let stamps = |ts: f64, per_second: f64, jitter: &dyn Fn(u32) -> f64| -> Result<f64> {
+            let stamp = |k| 1_764_352_842.0 + ((f64::from(k) * ts + jitter(k)) * per_second).round() / per_second;
+            let times: Vec<f64> = (0..20_000).map(stamp).collect();
+            Ok(TimeSource::default().resolve("t", Some(&times))?.time.ts())
+        };
+        for (ts, per_second) in [(1e-3, 1e3), (5e-5, 1e6), (2e-4, 1e6), (0.02, 1e2)] {
+            assert_eq!(stamps(ts, per_second, &|_| 0.0).unwrap(), ts);
+        }
+        assert!((stamps(1.0 / 150.0, 1e3, &|_| 0.0).unwrap() * 150.0 - 1.0).abs() < 1e-5);
+        let error = stamps(0.005, 1e3, &|k| [0.0, 1e-3][usize::from(k % 7 == 3)]).unwrap_err();
+        assert!(matches!(error, Error::NonUniformTime { row: 4 | 5, .. }), "{error}");
+        // A clock that wanders by more than the rounding, each step within it.
+        assert!(stamps(1.0 / 150.0, 1e3, &|k| 0.02 * (f64::from(k) / 3e3).sin()).is_err());
     }
 
     #[test]

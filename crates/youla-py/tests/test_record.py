@@ -68,6 +68,8 @@ def test_a_file_with_a_clock_in_milliseconds_is_refused_in_words_of_python(tmp_p
         with pytest.raises(youla.InputError, match=says) as told:
             youla.Record(data, inputs="u", outputs="y", time=time)
         assert "[data]" not in str(told.value)
+    stamps = 1764352842 + np.round(np.arange(3000) / 150, 3)  # steps of 6 and 7 ms
+    assert youla.Record({"t": stamps, "u": stamps, "y": -stamps}, inputs="u", outputs="y", time="t").dt == pytest.approx(1 / 150, rel=2e-5)
     dates = frame.assign(timestamp_ms=pd.to_datetime(frame["t_ms"], unit="ms"))
     dates.to_parquet(tmp_path / "dates.parquet")
     assert youla.Record(tmp_path / "dates.parquet", inputs="u", outputs="y", time="timestamp_ms").dt == pytest.approx(1e-3)

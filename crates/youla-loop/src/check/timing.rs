@@ -1,10 +1,11 @@
 //! Time steps: regular, complete, in order, and of the declared size.
 //!
-//! With the median step `ts` of the time column, step k is irregular where `|dt_k - ts| > tolerance ts`; it is a gap of
+//! With the step `ts` of the time column, step k is irregular where `|dt_k - ts| > tolerance ts`, and not by the rounding of the stamps; it is a gap of
 //! `round(dt_k / ts) - 1` samples from 1.5 ts on, a repeated time at (nearly) zero, a jump back below. Nothing here is
 //! random: there are no false alarms beyond the tolerance.
 
 use super::finding::{Finding, Severity, Test, few};
+use youla::signal::StampSteps;
 
 /// Missing samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,9 +19,9 @@ pub struct Gap {
 /// Properties of a time column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimingCheck {
-    /// Median step, seconds as declared by the column.
+    /// Step of the stamps ([`StampSteps`]), seconds as declared by the column.
     pub step: f64,
-    /// Root mean square of the deviations of the other steps, as a part of the median.
+    /// Root mean square of the deviations of the other steps, as a part of the step.
     pub jitter: f64,
     /// Largest such deviation.
     pub worst: f64,
@@ -32,18 +33,18 @@ pub struct TimingCheck {
     pub repeated: Vec<usize>,
     /// Rows, counted from 1, whose time is before that of the row before.
     pub back: Vec<usize>,
-    /// Declared sample time over the median step, where they differ by more than the tolerance.
+    /// Declared sample time over the step, where they differ by more than the tolerance.
     pub unit: Option<f64>,
 }
 
-/// Below this part of the median step a time counts as repeated.
+/// Below this part of the step a time counts as repeated.
 /// The jitter of a clock that repeats no sample is far smaller. Chosen, not measured.
 const REPEATED: f64 = 0.05;
 /// From this part on a step is a gap.
 /// A missing sample makes a step of 2; 1.5 is midway to a regular step of 1.
 const GAP: f64 = 1.5;
 
-/// Compares a time column with its own median step and against a declared sample time. `None` for less than three rows or
+/// Compares a time column with its own step and against a declared sample time. `None` for less than three rows or
 /// a median step that is not positive.
 ///
 /// ```
@@ -56,10 +57,8 @@ pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Ti
     if times.len() < 3 {
         return None;
     }
-    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if step.is_nan() || step <= 0.0 {
+    let StampSteps { mean: step, slack, median } = StampSteps::of(times, tolerance)?;
+    if step.is_nan() || median <= 0.0 {
         return None;
     }
     let (irregular, gaps, repeated, back) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -75,7 +74,7 @@ pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Ti
                 energy += (x - 1.0) * (x - 1.0);
                 count += 1;
                 found.worst = found.worst.max((x - 1.0).abs());
-                if (x - 1.0).abs() > tolerance {
+                if (x - 1.0).abs() * step > slack {
                     found.irregular.push(row);
                 }
             }
@@ -134,7 +133,7 @@ impl TimingCheck {
         if !self.irregular.is_empty() {
             let (from, to) = span(&self.irregular);
             let what = format!(
-                "{} steps deviate from the median of {} s, by {} % rms and {} % at most",
+                "{} steps deviate from the sample time of {} s, by {} % rms and {} % at most",
                 self.irregular.len(),
                 few(self.step),
                 few(100.0 * self.jitter),
@@ -169,5 +168,8 @@ mod tests {
         assert!(sentences[0].what.contains("milliseconds"), "{}", sentences[0].what);
         assert!(timing(&times[..20], Some(0.1), 1e-3).unwrap().findings("log", 1).is_empty());
         assert!(timing(&[0.0, 0.0, 0.0], None, 1e-3).is_none());
+        let epoch: Vec<f64> = (0..1000).map(|k| 1_764_352_842.0 + f64::from(k) * 2e-4).collect();
+        let found = timing(&epoch, Some(2e-4), 1e-3).unwrap();
+        assert!(found.step == 2e-4 && found.findings("log", 1).is_empty(), "{found:?}");
     }
 }

@@ -94,16 +94,19 @@ def _clock(times: Any, dt: float | None, what: str, column: Any = "", turned: st
     if steps.size and usual <= 0:
         falls = f"falls, newest row first; give {turned}" if usual < 0 else "stands still; give the time of every row, or the sample time as dt="
         raise InputError(f"{what} {falls}")
-    # As the readers of files have it: a step may differ from the others by 1 %.
-    uneven = np.flatnonzero(np.abs(steps - usual) > 0.01 * abs(usual))
-    if uneven.size:
+    try:
+        return _native.clock(what, np.ascontiguousarray(seconds), dt)
+    except InputError:
+        # As the readers of files have it: a step may differ from the others by 0.1 %, and by the rounding of the times.
+        uneven = np.flatnonzero(np.abs(steps - usual) > 1e-3 * abs(usual))
+        if not uneven.size:
+            raise
         k = int(uneven[0])
         raise InputError(
             f"{what} is not uniform: sample {k + 1}, counted from 0, comes {steps[k]:.6g} s after the one before, the usual step is {usual:.6g} s "
             f"({uneven.size} such steps); "
             "cut at gaps and give identify a list of records, or bring it to one clock: youla.Channels(data, time=...).synchronise(dt=...)"
-        )
-    return _native.clock(what, np.ascontiguousarray(seconds), dt)
+        ) from None
 
 
 def _of_array(data: Any, chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None) -> Source:

@@ -13,6 +13,7 @@ mod periodic;
 mod persistency;
 mod record;
 mod spectrum;
+mod stamps;
 mod transform;
 
 pub use channel::{Channel, unknown};
@@ -31,4 +32,5 @@ pub use spectrum::{
     CrossSpectrum, ExcitedRecord, ExplainedPower, IndirectResponse, Welch, cross_spectrum, explained_power,
     indirect_response,
 };
+pub use stamps::StampSteps;
 pub(crate) use transform::of_two_real;

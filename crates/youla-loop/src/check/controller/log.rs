@@ -1,7 +1,7 @@
 //! The part of the logged input that the controller does not explain, as declared and with one change.
 
 use super::gains::gains;
-use super::{Change, ControllerRecord, GainPart};
+use super::{CONTAINED, Change, ControllerRecord, GainPart};
 use crate::error::Result;
 use youla::Mat;
 use youla::linalg::{block, eye, least_squares};
@@ -93,7 +93,8 @@ impl<'a> Log<'a> {
         Ok(Some((change, self.residual(k, &e, &w)?)))
     }
 
-    /// Share of `u - K e` that the excitation explains, a few samples early or late, in the input where it is least.
+    /// Share of `u - K e` that the excitation explains, a few samples early or late, in the input where it is least; 1 where it is too small beside the rest for
+    /// the comparison: in the input or not, it would explain little.
     pub(super) fn contained(&self, k: &StateSpace<Discrete>) -> Result<f64> {
         let Some(d) = self.record.input_excitation else { return Ok(1.0) };
         let u = self.record.u;
@@ -104,6 +105,9 @@ impl<'a> Log<'a> {
         for j in (0..d.ncols()).filter(|j| d.col(*j).norm_max() > 0.0) {
             let regressors = Mat::from_fn(rows, 2 * reach + 1, |t, lag| d[(t + lag, j)]);
             let target = left.submatrix(reach, j, rows, 1);
+            if d.col(j).squared_norm_l2() < 2.0 * CONTAINED * target.squared_norm_l2() {
+                continue;
+            }
             let found = least_squares("the excitation in the input", regressors.as_ref(), target)?;
             let rest = target - regressors * found.x;
             least = least.min(1.0 - rest.squared_norm_l2() / target.squared_norm_l2().max(f64::MIN_POSITIVE));
@@ -189,5 +193,24 @@ mod tests {
         let log = Log::new(record);
         assert!(log.residual(&k, &log.e, &log.w).unwrap() < 1e-9);
         assert!(log.residual(&k.negated(), &log.e, &log.w).unwrap() > 0.1);
+    }
+
+    /// Another column is told beside the controller that ran, and nothing of the excitation beside one of another unit.
+    #[test]
+    fn the_excitation_is_compared_where_it_matters() {
+        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+        let k = |gain: f64| {
+            let time = Discrete::new(1e-3).unwrap();
+            StateSpace::new(number(0.5), number(1.0), number(gain), number(gain), time).unwrap()
+        };
+        let square = |half: usize| Mat::from_fn(2000, 1, |t, _| if (t / half).is_multiple_of(2) { 1.0 } else { -1.0 });
+        let (y, d, other) = (Mat::from_fn(2000, 1, |t, _| (0.07 * t as f64).sin()), square(37), square(23));
+        let u = youla::lti::simulate(&k(0.5), y.as_ref(), &[0.0]).unwrap() + &d;
+        let contained = |d: &Mat<f64>, gain: f64| {
+            let (u, y, input_excitation) = (u.as_ref(), y.as_ref(), Some(d.as_ref()));
+            Log::new(ControllerRecord { u, y, input_excitation, reference: None }).contained(&k(gain)).unwrap()
+        };
+        assert!(contained(&d, 0.5) > 0.99 && contained(&other, 0.5) < CONTAINED);
+        assert_eq!([contained(&d, 30.0), contained(&other, 30.0)], [1.0; 2]);
     }
 }

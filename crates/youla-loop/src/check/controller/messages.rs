@@ -1,6 +1,6 @@
 //! The finding on a controller.
 
-use super::{Change, ControllerCheck, Parts};
+use super::{CONTAINED, Change, ControllerCheck, Parts};
 use crate::check::finding::{Finding, Severity, Test, few};
 use crate::check::options::CheckOptions;
 use crate::error::Error;
@@ -9,10 +9,6 @@ use youla::signal::Channel;
 /// Share of the input below which what the controller does not explain is rounding of a log with six digits.
 /// Chosen, not measured.
 const NO_EXCITATION: f64 = 1e-5;
-
-/// Share of what the controller leaves of the input that the excitation in it must explain.
-/// A wrong controller leaves the most of the excitation; another signal explains 7 lags over the samples. Chosen, not measured.
-const CONTAINED: f64 = 0.1;
 
 /// What to do where a reference moves that may enter by a path of its own.
 const PATH: &str = "If the reference enters by another path than the output (two degrees of freedom, feedforward), declare it: \
@@ -160,11 +156,11 @@ impl ControllerCheck {
                  Choose the column that is added to the input",
                 few(100.0 * self.contained.unwrap_or(0.0))
             ),
-            None if self.excited => {
-                "Check for saturation, a delay, a different sample time or a different controller; no single change of sign, \
-                 gain, shift or channel order explains it"
-                    .into()
-            }
+            None if self.excited => format!(
+                "Check for {}saturation, a delay, a different sample time or a different controller; no single change of sign, \
+                 gain, shift or channel order explains it",
+                if self.guided { "" } else { "a reference that is not declared, " }
+            ),
             None if self.guided => "Log what else is added to the input".into(),
             None => "Log the excitation; without it the controller cannot be checked".into(),
         };

@@ -54,6 +54,9 @@ fn variables(mut file: impl Read + Seek, path: &Path) -> Result<Variables> {
         return Ok(Variables::new(path, vec![Variable { name: SINGLE.into(), value }]));
     }
     let mut archive = ZipArchive::new(file).map_err(|e| corrupt(0, format!("a NumPy archive: {e}")))?;
+    if let Some((found, remedy)) = foreign(|name| archive.file_names().any(|n| n.ends_with(name))) {
+        return Err(Error::FormatNotRead { path: path.to_owned(), found, remedy });
+    }
     let mut variables = Vec::new();
     let mut taken: Vec<Range<u64>> = Vec::new();
     for k in 0..archive.len() {
@@ -70,6 +73,18 @@ fn variables(mut file: impl Read + Seek, path: &Path) -> Result<Variables> {
         variables.push(Variable { name, value });
     }
     Ok(Variables::new(path, variables))
+}
+
+/// A zip archive of another program, by the names in it: what it is, and what to do.
+fn foreign(holds: impl Fn(&str) -> bool) -> Option<(&'static str, &'static str)> {
+    let sheet =
+        "save the sheet with the log as CSV, or read it in Python with pandas.read_excel and give the data frame";
+    match () {
+        () if holds(".npy") => None,
+        () if holds("xl/workbook.xml") || holds("xl/workbook.bin") => Some(("an Excel workbook", sheet)),
+        () if holds("META-INF/manifest.xml") => Some(("an OpenDocument file", sheet)),
+        () => Some(("a zip archive without NumPy arrays", "unpack it and give the file with the log")),
+    }
 }
 
 /// Type, order and shape of an array.
@@ -254,6 +269,19 @@ mod tests {
             assert!(matches!(read_bytes(&bytes), Err(Error::Corrupt { .. })), "{shape}");
         }
         assert!(matches!(read_bytes(b"no archive"), Err(Error::Corrupt { at: CorruptAt::Byte(0), .. })));
+    }
+
+    #[test]
+    fn archives_of_other_programs_are_named() {
+        for (name, found, remedy) in [
+            ("xl/workbook.xml", "an Excel workbook", "as CSV"),
+            ("META-INF/manifest.xml", "an OpenDocument file", "as CSV"),
+            ("log.csv", "a zip archive without NumPy arrays", "unpack it"),
+        ] {
+            let bytes = archive(&[("first", vec![0; 9]), (name, vec![0; 9])], zip::CompressionMethod::Stored);
+            let said = read_bytes(&bytes).unwrap_err().to_string();
+            assert!(said.contains(&format!("{found} cannot be read; ")) && said.contains(remedy), "{said}");
+        }
     }
 
     static SAMPLE: LazyLock<Vec<u8>> = LazyLock::new(sample);

@@ -142,6 +142,10 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
             let remedy = "save the data as CSV or NPZ, or read it by the Python package";
             return Err(Error::FormatNotRead { path: source.path.clone(), found: "a Parquet file", remedy });
         }
+        [0xd0, 0xcf, 0x11, 0xe0, ..] => {
+            let remedy = "save the sheet with the log as CSV";
+            return Err(Error::FormatNotRead { path: source.path.clone(), found: "an Excel workbook (.xls)", remedy });
+        }
         start if start.starts_with(b"MATLAB") || start.starts_with(b"\x89HDF") => Format::Mat,
         _ if source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) => Format::Mat,
         _ => Format::Csv,

@@ -58,6 +58,10 @@ impl Lines {
         if let Some((_, found)) = LOGGERS.iter().find(|(magic, _)| start.starts_with(magic)) {
             return Err(Error::FormatNotRead { path: path.to_owned(), found, remedy: OF_LOGGERS });
         }
+        if start.starts_with(b"PK\x03\x04") {
+            let (found, remedy) = ("a zip archive or an Excel workbook", "give the log in it as text");
+            return Err(Error::FormatNotRead { path: path.to_owned(), found, remedy });
+        }
         let gzip = start.starts_with(&GZIP_MAGIC);
         Ok(Lines {
             path: path.to_owned(),

@@ -320,6 +320,12 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
         |sign| format!(" with the declared decimal sign; set decimal = \"{sign}\" if the whole file uses the {sign}");
     match decimal {
         Some(sign) => remedy(sign),
+        None if text.contains(':') => "; a date with a time is read as 2026-03-01T10:00:00.000; of another stamp, leave the column out and state \
+                                       the sample time (sample_time in [data], --sample-time)"
+            .into(),
+        None if text.chars().all(|c| c.is_ascii_digit() || "+-.,' \u{a0}".contains(c)) => {
+            "; write numbers without separators of thousands, as 1234.5".into()
+        }
         None if text.chars().any(char::is_alphabetic) => {
             "; a line of units or notes is passed over where skip_lines in [data] csv (--skip-lines) names it; a row of a fault is left out \
              of the file, and gaps = \"split\" in [data] cuts the record there"

@@ -5,7 +5,9 @@ use super::options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 use crate::choose::ChannelRef;
 use crate::error::{Error, Result};
 use crate::time::require_seconds;
+use std::borrow::Cow;
 use std::collections::HashSet;
+use toml::value::Offset;
 
 /// Most columns of a table. Rows are samples; a compressed file of some kilobytes may contain millions of cells on one line.
 const MOST_COLUMNS: usize = 1 << 16;
@@ -94,7 +96,7 @@ impl Fields {
         for line in lines.passed() {
             let cells = self.cells(line);
             if cells.len() == self.names.len() {
-                require_seconds(&what, name, String::from_utf8_lossy(cells[index]).trim())?;
+                require_seconds(&what, name, decoded(cells[index]).trim())?;
             }
         }
         Ok(())
@@ -109,8 +111,7 @@ impl Fields {
         while lines.advance()? {
             let cells = self.cells(lines.current());
             if cells.len() != expected {
-                let (path, line, found) = (lines.path().to_owned(), lines.number(), cells.len());
-                return Err(Error::FieldCount { path, line, found, expected });
+                return Err(self.bad_count(lines, cells.len()));
             }
             for (k, (column, cell)) in columns.iter_mut().zip(cells).enumerate() {
                 let Ok(values) = column else { continue };
@@ -126,8 +127,20 @@ impl Fields {
         if rows == 0 { Err(no_rows(lines)) } else { Ok(columns) }
     }
 
+    /// Too many or too few cells; where quotes hold the delimiter, as a separator of thousands, the cell with them.
+    fn bad_count(&self, lines: &Lines, found: usize) -> Error {
+        let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.names.len());
+        let cells = header_cells(lines, self.delimiter);
+        let delimiter = self.delimiter.map(char::from).filter(|_| cells.len() == expected);
+        let quoted = delimiter.and_then(|delimiter| cells.iter().position(|cell| cell.contains(delimiter)));
+        match quoted {
+            Some(column) => self.bad_cell(lines, column, cells[column].as_bytes()),
+            None => Error::FieldCount { path, line, found, expected },
+        }
+    }
+
     fn bad_cell(&self, lines: &Lines, column: usize, cell: &[u8]) -> Error {
-        let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
+        let text = decoded(cell).trim().chars().take(40).collect();
         let other = self.decimal.other();
         let decimal = number(cell, other).map(|_| other.key());
         let (path, column) = (lines.path().to_owned(), self.names[column].clone());
@@ -184,8 +197,7 @@ impl Selection {
             }
         };
         if found != self.targets.len() {
-            let (path, line) = (lines.path().to_owned(), lines.number());
-            return Err(Error::FieldCount { path, line, found, expected: self.targets.len() });
+            return Err(fields.bad_count(lines, found));
         }
         Ok(true)
     }
@@ -213,11 +225,7 @@ impl Selection {
 
     /// A line with a field too many or too few is reported as that, not as the cell that moved.
     fn bad_cell(&self, fields: &Fields, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
-        let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.targets.len());
-        if found != expected {
-            return Error::FieldCount { path, line, found, expected };
-        }
-        fields.bad_cell(lines, column, cell)
+        if found == self.targets.len() { fields.bad_cell(lines, column, cell) } else { fields.bad_count(lines, found) }
     }
 }
 
@@ -249,7 +257,7 @@ fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
 
 /// The cells of the first line; names may be quoted.
 fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
-    let text = |cell: &[u8]| String::from_utf8_lossy(cell).trim().to_owned();
+    let text = |cell: &[u8]| decoded(cell).trim().to_owned();
     let Some(delimiter) = delimiter else {
         return lines.current().split(|b| b.is_ascii_whitespace()).filter(|c| !c.is_empty()).map(text).collect();
     };
@@ -265,15 +273,21 @@ fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
     }
 }
 
+/// Text as UTF-8 or, where it is none, as Latin-1, which gives each byte a character.
+fn decoded(cell: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(cell).map_or_else(|_| cell.iter().map(|byte| char::from(*byte)).collect(), Cow::Borrowed)
+}
+
 /// A cell in which a logger says that a channel has no sample.
 fn is_blank(cell: &[u8]) -> bool {
     unquoted(cell).is_some_and(|text| text.trim().is_empty() || text.trim().eq_ignore_ascii_case("nan"))
 }
 
-/// A finite number, perhaps in quotes and with blanks around it.
+/// A finite number, perhaps in quotes and with blanks around it; of a date with a time the seconds since 1970.
 fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
     let text = unquoted(cell)?;
     let value: f64 = match decimal {
+        _ if text.contains(':') => instant(text)?,
         DecimalSign::Point => text.parse().ok()?,
         DecimalSign::Comma if text.contains('.') => return None,
         DecimalSign::Comma => text.replacen(',', ".", 1).parse().ok()?,
@@ -281,9 +295,23 @@ fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
     Some(value).filter(|x| x.is_finite())
 }
 
+/// Seconds since 1970 of a date with a time such as `2026-03-01T10:00:00.25Z`; without an offset as if it were UTC.
+fn instant(text: &str) -> Option<f64> {
+    let toml::value::Datetime { date: Some(date), time: Some(time), offset } = text.parse().ok()? else { return None };
+    let ahead = if let Some(Offset::Custom { minutes }) = offset { i64::from(minutes) } else { 0 };
+    // Years from March on: a leap day is the last of its year.
+    let (year, month) = (i64::from(date.year), i64::from(date.month));
+    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let days = 365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + i64::from(date.day) - 719_469;
+    let minutes = (24 * days + i64::from(time.hour)) * 60 + i64::from(time.minute) - ahead;
+    let seconds = 60 * minutes + i64::from(time.second.unwrap_or(0));
+    Some(seconds as f64 + f64::from(time.nanosecond.unwrap_or(0)) / 1e9)
+}
+
 /// Whether a cell of the first line is no name: a number of any kind, with either decimal sign.
 fn is_number(cell: &[u8]) -> bool {
-    unquoted(cell).is_some_and(|text| text.parse::<f64>().is_ok() || text.replacen(',', ".", 1).parse::<f64>().is_ok())
+    let number = |text: &str| text.parse::<f64>().is_ok() || instant(text).is_some();
+    unquoted(cell).is_some_and(|text| number(text) || text.replacen(',', ".", 1).parse::<f64>().is_ok())
 }
 
 fn unquoted(cell: &[u8]) -> Option<&str> {

@@ -34,6 +34,8 @@ fn names_and_numbers_in_every_dialect() {
         assert_eq!(record.data(), expected, "{text:?}");
         assert_eq!(record.channels()[1].name, "b", "{text:?}");
     }
+    let record = read(b"a;Gr\xf6\xdfe\n1;2\n", &[ChannelSpec::named("Gr\u{f6}\u{df}e")], &second()).unwrap();
+    assert_eq!(record.data()[(0, 0)], 2.0, "Latin-1");
     let spec = [ChannelSpec::from("y", ChannelRef::Column(2), "V")];
     let record = read(b" 1\t2\t\n 3\t4\t\n", &spec, &second()).unwrap();
     assert_eq!((record.column("y").unwrap(), record.channels()[0].label()), (&[2.0, 4.0][..], "y [V]".to_owned()));
@@ -52,10 +54,17 @@ fn errors_say_where() {
         ("a,b\n", "there is no line with data"),
         ("# only\n", "there is no line with data"),
         ("", "the file is empty (0 bytes)"),
+        ("PK\u{3}\u{4}\0", "a zip archive or an Excel workbook cannot be read; give the log in it as text"),
         ("a,a\n1,2\n", "more than one channel named \"a\""),
         ("1,5;2,5\n", "the delimiter is ambiguous: line 1 contains a comma and a semicolon"),
         ("t\n1\n", "there is no column besides the time"),
         ("a,2\n1,2\n", "line 1, column #1: \"a\""),
+        (
+            "a,b\n1,\"1,234.5\"\n",
+            "line 2, column b: \"1,234.5\" is not a finite number; write numbers without separators",
+        ),
+        ("a,b\n\"1,234.5\",x\n", "line 2, column a: \"1,234.5\" is not a finite number; write numbers without"),
+        ("t,b\n10:00:00.1,2\n", "column t: \"10:00:00.1\" is not a finite number; a date with a time is read as"),
     ] {
         let time = if text.starts_with('t') { TimeSource::column("t".parse().unwrap()) } else { second() };
         let message = read(text.as_bytes(), &[], &time).unwrap_err().to_string();
@@ -106,6 +115,13 @@ fn time_column_and_declaration() {
     let by_column = TimeSource::column("t".parse().unwrap());
     let record = read(text, &[], &by_column).unwrap();
     assert_eq!((record.time().ts(), record.start(), record.channels().len()), (0.5, 5.0, 1));
+    for stamps in [
+        ["2024-02-29T23:59:59.75Z", "2024-03-01T00:00:00Z"],
+        ["2024-03-01 01:59:59.75+02:00", "2024-03-01 02:00:00+02:00"],
+    ] {
+        let record = read(format!("t,a\n{},1\n{},2\n", stamps[0], stamps[1]).as_bytes(), &[], &by_column).unwrap();
+        assert_eq!((record.time().ts(), record.start()), (0.25, 1_709_251_199.75), "{stamps:?}");
+    }
     let both = TimeSource { ts: Some(0.4), ..by_column.clone() };
     assert!(matches!(read(text, &[], &both), Err(Error::Method(youla::Error::SampleTimeMismatch { .. }))));
     let gap = read(b"t,a\n0,1\n1,2\n2,3\n4,4\n5,5\n", &[], &by_column).unwrap_err();

@@ -47,7 +47,7 @@ pub use settings::{
     AlternativeStructure, Cascade, CascadeGains, ControllerSettings, DataFile, DataSettings, Discretisation,
     DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
     LoopGain, NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
-    parse_table,
+    parse_table, tables_with,
 };
 pub use stages::certificate::RunCertificate;
 pub use stages::clock::{Stage, StageClock, StageTimes};

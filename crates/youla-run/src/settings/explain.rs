@@ -2,6 +2,7 @@
 
 use super::controller::ControllerSettings;
 use super::models::NominalModel;
+use super::places::tables_with;
 use crate::Error;
 use serde::de::value::{Error as ProbeError, StrDeserializer};
 use serde::de::{DeserializeOwned, IntoDeserializer};
@@ -19,11 +20,20 @@ pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path, at: &str
         place.table = at.to_owned();
     }
     let problem = match toml::from_str::<toml::Table>(text) {
-        Ok(_) => sentence(&message, &place),
+        Ok(document) => sentence(&message, &place) + &stray(&message, &document),
         Err(_) if message == "duplicate key" => format!("the key `{}` is given twice", place.found),
         Err(_) => format!("this is not TOML: {message}{}", remedy(text, start)),
     };
     problem_at(path, text, start, problem)
+}
+
+/// The table of a key that stands where one of several forms is chosen and belongs elsewhere.
+fn stray(message: &str, document: &toml::Table) -> String {
+    let chosen = ["controller", "nominal"].into_iter().filter(|_| message.starts_with("wanted exactly 1 element"));
+    let keys = chosen.filter_map(|table| document.get(table)?.as_table()).flat_map(|table| table.keys());
+    let places = keys.map(|key| (short(key), tables_with(key)));
+    let mut elsewhere = places.filter(|(_, of)| of.starts_with('[') && !of.contains("[controller"));
+    elsewhere.next().map_or(String::new(), |(key, of)| format!("; `{key}` is a key of {of}"))
 }
 
 /// What the line shows that the parser does not name.
@@ -169,8 +179,10 @@ fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
         Some(k) => format!("did you mean `{k}`? The"),
         None => "the".into(),
     };
+    let tables = if is == "key" { tables_with(word) } else { String::new() };
     let word = short(word);
-    format!("`{word}` is not a {is} of {of}; {hint} {are} are {}", known.join(", "))
+    let place = if tables.is_empty() { tables } else { format!("; `{word}` is a key of {tables}") };
+    format!("`{word}` is not a {is} of {of}; {hint} {are} are {}{place}", known.join(", "))
 }
 
 /// The forms among which the user chooses one, asked of the types themselves.

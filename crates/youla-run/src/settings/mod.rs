@@ -11,6 +11,7 @@ mod grey_box;
 mod models;
 mod options;
 mod pid;
+mod places;
 mod readings;
 mod reference_path;
 
@@ -24,6 +25,7 @@ pub use grey_box::{AlternativeStructure, GreyBoxSettings};
 pub use models::{Domain, NominalModel, Polynomials};
 pub use options::{FactorSettings, FrequencySettings, Prediction, VerificationSettings};
 pub use pid::{Discretisation, IdealPid, LoopGain, ParallelPid};
+pub use places::tables_with;
 
 use crate::{Error, Result};
 use explain::{explain, problem_at};

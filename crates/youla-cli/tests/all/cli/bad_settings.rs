@@ -12,7 +12,7 @@ fn missing_file() {
 
 #[test]
 fn misspelt_keys_at_every_level() {
-    let cases: [(&str, &str, &[&str]); 11] = [
+    let cases: [(&str, &str, &[&str]); 13] = [
         ("name = \"loop\"", "nam = \"loop\"", &["run.toml:1:1:", "`nam`", "top level", "did you mean `name`?"]),
         ("[hansen]", "[hansn]", &["run.toml:21:2:", "`hansn` is not a key of the top level", "did you mean `hansen`?"]),
         ("time_column", "time_colum", &["run.toml:4:1:", "`time_colum`", "[data]", "`time_column`"]),
@@ -28,6 +28,16 @@ fn misspelt_keys_at_every_level() {
             "[controller.difference_equation]",
             "[controller.difference_equations]",
             &["run.toml:16:13:", "`difference_equations` is not a key of [controller]", "`difference_equation`?"],
+        ),
+        (
+            "horizon = 10",
+            "sample_time = 0.01",
+            &["run.toml:22:1: `sample_time` is not a key of [hansen]", "; `sample_time` is a key of [data]"],
+        ),
+        (
+            "[controller.difference_equation]",
+            "[controller]\nsample_time = 0.01\n[controller.difference_equation]",
+            &["[controller] must hold exactly one of", "; `sample_time` is a key of [data]"],
         ),
         ("horizon = 10", "horizn = 10", &["run.toml:22:1:", "`horizn`", "[hansen]", "`horizon`"]),
         ("order = 3", "order = \"autp\"", &["run.toml:23:9:", "`order` in [hansen]", "\"auto\""]),

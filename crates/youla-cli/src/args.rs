@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::output::Form;
-use crate::run_folder::OutputFolder;
+use crate::run_folder::{OutputFolder, place};
 use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, synchronise, workbench};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -109,7 +109,7 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN.TOML")]
         settings: PathBuf,
         /// Folder for one CSV file per record; made if need be.
-        #[arg(long, value_name = "DIR", default_value = "signals")]
+        #[arg(long, value_name = "DIR", default_value = "signals", value_parser = place())]
         out: PathBuf,
     },
     /// Design an excitation for the machine under its controller and predict the response of the nominal loop.

@@ -2,7 +2,7 @@
 
 use crate::log_flags::{LogFlags, places};
 use crate::output::{Failure, Form};
-use crate::run_folder::folder_of;
+use crate::run_folder::{folder_of, place};
 use clap::Args;
 use std::fs;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE", requires = "input")]
     options: Option<PathBuf>,
     /// Folder for check.json; it must not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = place())]
     out: Option<PathBuf>,
 }
 

@@ -5,8 +5,9 @@ use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
 use crate::{check, commission, compare, excite, export, init, paper, plot, rig, synchronise, table, workbench};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use youla_io::folder::RunFolder;
+use youla_io::require_free;
 use youla_run::{
     RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_schema,
     signal_records, write_into, write_signals,
@@ -79,6 +80,9 @@ fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {
     let records = read_records(&settings.data, &folder)?;
     let factorisation = factorise_run(&settings, &records, &folder)?;
     let signals = signal_records(&factorisation.factors, &records)?;
+    let read: Vec<PathBuf> = records.sources.iter().map(|source| folder.join(&source.path)).collect();
+    let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+    signals.iter().try_for_each(|r| require_free(&out.join(format!("{}.csv", r.name())), true, &read))?;
     let paths = write_signals(&signals, out)?;
     let written: Vec<(usize, String)> = signals
         .iter()

@@ -1,6 +1,7 @@
 //! `youla commission`: the circle of commissioning on the twin of the gas bearing.
 
 use crate::output::{Failure, Form, ask_line};
+use crate::run_folder::place;
 use clap::Args;
 use std::path::PathBuf;
 use youla_commission::{CampaignSummary, Operator, PointStatus, commission};
@@ -15,7 +16,7 @@ pub(crate) struct CommissionArgs {
     /// The campaign: machine, limits, goal, operating points.
     campaign: PathBuf,
     /// Folder of the results; an unfinished campaign there is resumed.
-    #[arg(long)]
+    #[arg(long, value_parser = place())]
     out: PathBuf,
     /// Switch without asking a person; with --json nobody is asked, and nothing is switched without it.
     #[arg(long)]

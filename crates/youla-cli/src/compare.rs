@@ -1,11 +1,13 @@
 //! `youla compare`: finished runs beside each other.
 
 use crate::output::{Failure, Form};
+use crate::run_folder::place;
 use crate::table::fitted;
 use crate::terminal;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use youla_io::folder::require_place;
+use youla_io::require_free;
 use youla_report::data::EvidenceTable;
 use youla_run::{Comparison, compare, write_comparison};
 
@@ -24,7 +26,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "NAME", default_value = "recommended")]
     model: String,
     /// Page to write; its data are written next to it as JSON.
-    #[arg(long, value_name = "FILE", default_value = "comparison.html")]
+    #[arg(long, value_name = "FILE", default_value = "comparison.html", value_parser = place())]
     out: PathBuf,
     /// Replace the files if they are there.
     #[arg(long)]
@@ -34,6 +36,9 @@ pub(crate) struct CompareArgs {
 /// Writes page and data and prints the tables.
 pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
     require_place(&args.out)?;
+    let read: Vec<&Path> = args.runs.iter().map(PathBuf::as_path).collect();
+    require_free(&args.out, args.force, &read)?;
+    require_free(&args.out.with_extension("json"), args.force, &read)?;
     let found = compare(&args.runs, &args.model)?;
     write_comparison(&found, &args.out, args.force)?;
     form.print(|| serde_json::json!(found), || text(&found, args))

@@ -1,9 +1,11 @@
 //! `youla export`: a model or the controller of a run, for another tool.
 
 use crate::output::{Failure, Form};
+use crate::run_folder::place;
 use clap::Args;
 use std::path::PathBuf;
 use youla_io::export::{ModelFormat, PidForm, c_controller, c_loop, export_model, export_pid, write_export};
+use youla_io::require_free;
 use youla_run::{caution_for_export, controller_for_export, loop_for_export, model_for_export, pid_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -37,7 +39,7 @@ pub(crate) struct ExportArgs {
     #[arg(long = "loop", value_name = "N")]
     of_loop: Option<usize>,
     /// File to write; the name of the model by default, in the working directory.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = place())]
     out: Option<PathBuf>,
     /// Replace the file if there is one.
     #[arg(long)]
@@ -121,6 +123,7 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
         }
     };
     let path = args.out.clone().unwrap_or(default);
+    require_free(&path, args.force, &[&args.source, args.q.as_ref().unwrap_or(&args.source)])?;
     write_export(&path, &bytes, args.force)?;
     let file = path.display().to_string();
     about["file"] = file.as_str().into();

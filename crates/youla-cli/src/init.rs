@@ -2,12 +2,13 @@
 
 use crate::log_flags::{Dialect, Sign, places};
 use crate::output::{Failure, Form, ask_line, say};
+use crate::run_folder::place;
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use youla::error::short;
 use youla::lti::Discrete;
-use youla_io::{ChannelRef, SurveyedColumn, require_free, survey};
+use youla_io::{ChannelRef, SurveyedColumn, require_free_for_settings, survey};
 use youla_run::{Draft, DraftClock, Feedback, path_from};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -55,7 +56,7 @@ pub(crate) struct InitArgs {
     #[command(flatten)]
     dialect: Dialect,
     /// File to write.
-    #[arg(long, value_name = "FILE", default_value = "run.toml")]
+    #[arg(long, value_name = "FILE", default_value = "run.toml", value_parser = place())]
     out: PathBuf,
     /// Replace it if it is there.
     #[arg(long)]
@@ -64,7 +65,7 @@ pub(crate) struct InitArgs {
 
 /// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
 pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
-    require_free(&args.out, args.force, &[&args.log])?;
+    require_free_for_settings(&args.out, args.force, &[&args.log])?;
     let csv = args.dialect.options();
     let columns = survey(&args.log, &csv)?;
     let missing = missing(args);

@@ -3,6 +3,7 @@
 use crate::interrupt;
 use crate::output::{Failure, Form, say, say_file};
 use crate::progress::Progress;
+use crate::run_folder::place;
 use crate::table;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
@@ -42,7 +43,7 @@ pub(crate) struct PaperArgs {
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Results folder; runs/paper-seed-S-models-N by default.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = place())]
     out: Option<PathBuf>,
     /// Write the settings that ship with the program to standard output, to be copied and edited, and do nothing else.
     #[arg(long, conflicts_with_all = ["settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
@@ -62,7 +63,7 @@ pub(crate) enum StudyCommand {
         #[arg(value_name = "PART", required = true)]
         parts: Vec<PathBuf>,
         /// Results folder; runs/paper-seed-S-models-N by default.
-        #[arg(long, value_name = "DIR")]
+        #[arg(long, value_name = "DIR", value_parser = place())]
         out: Option<PathBuf>,
     },
 }

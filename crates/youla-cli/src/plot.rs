@@ -1,6 +1,7 @@
 //! `youla plot`: figures of a run as SVG and CSV.
 
 use crate::output::{Failure, Form, lines_of};
+use crate::run_folder::place;
 use clap::Args;
 use std::path::PathBuf;
 use youla_report::{FigureChoice, Print};
@@ -28,7 +29,7 @@ pub(crate) struct PlotArgs {
     #[arg(long, requires = "figure")]
     csv: bool,
     /// Folder for the files, made if need be; files of the same names are replaced. RUN/figures by default.
-    #[arg(long, value_name = "DIR", requires = "figure")]
+    #[arg(long, value_name = "DIR", requires = "figure", value_parser = place())]
     out: Option<PathBuf>,
     /// Width on paper.
     #[arg(long, value_name = "CM", default_value_t = 17.0, allow_negative_numbers = true)]

@@ -2,6 +2,7 @@
 
 use crate::log_flags::{Dialect, places};
 use crate::output::{Failure, Form, lines_of};
+use crate::run_folder::place;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
@@ -51,7 +52,7 @@ pub(crate) struct SynchroniseArgs {
     #[command(flatten)]
     dialect: Dialect,
     /// Text file for the rows; `-1`, `-2` and so on are added where gaps cut the log.
-    #[arg(long, value_name = "FILE", default_value = "synchronised.csv")]
+    #[arg(long, value_name = "FILE", default_value = "synchronised.csv", value_parser = place())]
     out: PathBuf,
     /// Replace files that exist.
     #[arg(long)]

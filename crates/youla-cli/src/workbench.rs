@@ -1,6 +1,7 @@
 //! `youla workbench`: the page that identifies in a browser.
 
 use crate::output::{Failure, Form};
+use crate::run_folder::place;
 use clap::Args;
 use std::path::PathBuf;
 use youla_io::export::write_export;
@@ -14,7 +15,7 @@ Example:
 #[derive(Debug, Args)]
 pub(crate) struct WorkbenchArgs {
     /// File to write.
-    #[arg(long, value_name = "FILE", default_value = "workbench.html")]
+    #[arg(long, value_name = "FILE", default_value = "workbench.html", value_parser = place())]
     out: PathBuf,
     /// Replace it if it is there.
     #[arg(long)]

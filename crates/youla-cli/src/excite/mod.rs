@@ -3,7 +3,7 @@
 mod text;
 
 use crate::output::{Failure, Form, lines_of};
-use crate::run_folder::folder_of;
+use crate::run_folder::{folder_of, place};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use youla_io::export::SequenceFormat;
@@ -106,7 +106,7 @@ pub(crate) struct ExciteArgs {
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "csv", value_parser = format)]
     to: Vec<SequenceFormat>,
     /// Folder for alpha.csv, alpha.h and alpha.mat; made if need be.
-    #[arg(long, value_name = "DIR", default_value = "excite")]
+    #[arg(long, value_name = "DIR", default_value = "excite", value_parser = place())]
     out: PathBuf,
     /// Replace the files if there are any.
     #[arg(long)]

@@ -3,13 +3,14 @@
 use super::{ADDRESS, refused, seconds};
 use crate::output::{Failure, Form};
 use crate::progress::Progress;
+use crate::run_folder::place;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use youla_io::require_free;
+use youla_io::require_free_for_settings;
 use youla_rig::{
     Answer, CsvLog, Error, LogReport, Outcome, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings,
 };
@@ -32,7 +33,7 @@ pub(crate) struct RecordArgs {
     #[arg(help = ADDRESS)]
     address: String,
     /// The log, a CSV file.
-    #[arg(long, value_name = "LOG")]
+    #[arg(long, value_name = "LOG", value_parser = place())]
     out: PathBuf,
     /// Seconds.
     #[arg(long, value_name = "S")]
@@ -80,7 +81,7 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
     let duration = seconds("--duration", args.duration)?;
     let run_file = args.out.with_file_name("run.toml");
     for path in [&args.out, &run_file, &CsvLog::part_path(&args.out, 2)] {
-        require_free(path, args.force, &[])?;
+        require_free_for_settings(path, args.force, &args.settings.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     }
     let base = args.settings.as_deref().map(youla_io::read_text).transpose()?;
     let mut rig = Rig::connect(&args.address)?;

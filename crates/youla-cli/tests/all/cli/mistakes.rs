@@ -151,7 +151,7 @@ const LOGS: [Mistake; 7] = [
     ),
 ];
 
-const CALLS: [Mistake; 19] = [
+const CALLS: [Mistake; 26] = [
     called("a log for a run.toml", &["check", "log.csv"], &["log.csv", "--input", "--output", "youla init"]),
     called("the same to identify", &["identify", "log.csv"], &["log.csv", "--input", "--sample-time", "youla init"]),
     called("the same to signals", &["signals", "log.csv"], &["log.csv: this is no run.toml", "youla init"]),
@@ -248,6 +248,25 @@ const CALLS: [Mistake; 19] = [
         &["pid.json", "`feedback`", "leave --feedback out"],
     ),
     called("a flag that does not exist", &["identify", "run.toml", "--ouput", "x"], &["'--ouput'", "--output"]),
+    called("a key as a flag", &["identify", "run.toml", "--order", "4"], &["'--order'", "key of [recommended] and "]),
+    called("a folder as an output", &["identify", "run.toml", "--output", "new"], &["--out is the folder of the run"]),
+    called("a stream for a folder", &["identify", "run.toml", "--out", "-"], &["'-'", "file or folder", "--json"]),
+    called("a stream for a file", &["export", "g.json", "--to", "c", "--out=-"], &["'-'", "file or folder", "--json"]),
+    called(
+        "a page over settings",
+        &["compare", "mine", "mine", "--out", "run.toml", "--force"],
+        &["run.toml is not replaced: it is a file of settings"],
+    ),
+    called(
+        "a page over a file of the runs",
+        &["compare", "mine", "mine", "--out", "mine/thesis.tex", "--force"],
+        &["mine/thesis.tex is not replaced: the data are read from it"],
+    ),
+    called(
+        "a model over itself",
+        &["export", "g.json", "--to", "json", "--out", "g.json", "--force"],
+        &["g.json is not replaced: the data are read from it"],
+    ),
     called("a verb that does not exist", &["idenfity", "run.toml"], &["'idenfity'", "'identify'"]),
     called(
         "a folder of one's own",

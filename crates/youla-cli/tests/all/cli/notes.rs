@@ -1,6 +1,6 @@
 //! Notes of a run that must say what the record holds, and no more.
 
-use crate::common::{SETTINGS, csv, log, loop_folder, youla};
+use crate::common::{SETTINGS, csv, log, loop_folder, settings, youla};
 
 /// Of the variance of y the noise, uniform within 0.025, is 26.2 dB below; the loop amplifies it by a few dB. A model explains 99 % of y,
 /// so that a ratio below 18 dB cannot be right. Notes that are alike are one.
@@ -42,4 +42,20 @@ fn a_region_reaches_further_than_an_interval() {
     let (_, sentence) = report.split_once("region of all parameters together; ").expect("the sentence");
     let sentence = sentence.split_once('"').expect("its end").0;
     assert!(sentence.contains("reaches further than the region at one frequency"), "{sentence}");
+}
+
+/// A time limit ends no search of an order that is fixed, and this is said before the run.
+#[test]
+fn a_time_limit_beside_a_fixed_order_is_no_promise() {
+    let fixed = settings("[hansen]", "[recommended]\norder = 2\n\n[hansen]");
+    let folder = loop_folder("time-limit", &[("fixed.toml", fixed.as_bytes())]);
+    for (file, said) in [("fixed.toml", true), ("run.toml", false)] {
+        let found = youla(&folder, &["identify", file, "--time-limit", "600"]);
+        assert_eq!(
+            (found.code, found.stderr.contains("order = 2 is fixed in [recommended]")),
+            (Some(0), said),
+            "{}",
+            found.stderr
+        );
+    }
 }

@@ -1,19 +1,20 @@
 //! An excitation for the machine of a run.toml: its loop, the sequence, the files.
 
 use crate::Result;
-use crate::records::{channels_of, read_records};
+use crate::records::{RunRecords, channels_of, read_records};
 use crate::settings::RunSettings;
 use crate::stages::factors::{DeclaredLoop, factorise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use youla::control::{RunningController, with_input_port};
+use youla::identify::likelihood::figure;
 use youla::lti::{Discrete, Partitioned};
 use youla::signal::Channel;
-use youla::signal::{Detrend, Record};
+use youla::signal::{Detrend, LoopRecord, Record};
 use youla_io::export::{SequenceFormat, export_sequence};
 use youla_io::folder::replace_files;
 use youla_io::{Format, Gaps, Source, TimeSource, read, require_free};
-use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
+use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, PredictedPeak, excite, output_noise};
 
 /// Where the excitation enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,7 +51,12 @@ pub struct RunExcitation {
     pub outputs: Vec<Channel>,
     /// The excitation.
     pub excited: Excited,
+    /// Channels that it is predicted to move far beyond what the records show of them, where these were read.
+    pub cautions: Vec<String>,
 }
+
+/// A predicted magnitude above so many times that in the records is most likely a wrong unit. Chosen, not measured.
+const BEYOND: f64 = 10.0;
 
 /// Makes an excitation for the machine that `settings` describe, in the loop of its nominal model; paths are relative to `folder`.
 ///
@@ -69,7 +75,7 @@ pub fn excite_run(
     port: Option<ExcitationPort>,
     quiet: Option<&Path>,
 ) -> Result<RunExcitation> {
-    let time = sample_time(settings, folder)?;
+    let (time, records) = sample_time(settings, folder)?;
     let declared = DeclaredLoop::new(settings, folder, time)?;
     let port = port.unwrap_or_else(|| usual_port(settings, &declared.running));
     let (inputs, outputs) = (channels_of(&settings.data.inputs), channels_of(&settings.data.outputs));
@@ -89,15 +95,39 @@ pub fn excite_run(
         [] => inputs.iter().map(|c| Channel::new(format!("alpha_{}", c.name), &c.unit)).collect(),
         channels => channels_of(channels),
     };
-    Ok(RunExcitation { name: settings.name.clone(), port, columns, inputs, outputs, excited })
+    let cautions = records.map_or(Vec::new(), |records| beyond(&excited, &records.estimation));
+    Ok(RunExcitation { name: settings.name.clone(), port, columns, inputs, outputs, excited, cautions })
 }
 
-fn sample_time(settings: &RunSettings, folder: &Path) -> Result<Discrete> {
+/// The predicted magnitudes that are far above those of the records.
+fn beyond(excited: &Excited, records: &[LoopRecord]) -> Vec<String> {
+    let logged = |j: usize, of: &LoopRecord| {
+        let (u, y) = (of.u(), of.y());
+        if j < u.ncols() { u.col(j).norm_max() } else { y.col(j - u.ncols()).norm_max() }
+    };
+    let of = |(j, predicted): (usize, &PredictedPeak)| {
+        let most = records.iter().map(|of| logged(j, of)).fold(0.0, f64::max);
+        let (peak, label) = (figure(predicted.peak), predicted.channel.label());
+        let told = || {
+            format!(
+                "{label} is predicted to reach {peak}, in the log it reaches {}: check --amplitude and its unit",
+                figure(most)
+            )
+        };
+        (most > 0.0 && predicted.peak > BEYOND * most).then(told)
+    };
+    excited.summary.predicted.iter().enumerate().filter_map(of).collect()
+}
+
+/// The sample time, and the records where they were read for it.
+fn sample_time(settings: &RunSettings, folder: &Path) -> Result<(Discrete, Option<RunRecords>)> {
     match settings.data.sample_time {
-        Some(ts) => Ok(Discrete::new(ts)?),
+        Some(ts) => Ok((Discrete::new(ts)?, None)),
         None => {
             let part = "[data] states no sample_time, and the records, which would show it, cannot be read";
-            read_records(&settings.data, folder).map(|records| records.time).map_err(|e| e.within(part))
+            read_records(&settings.data, folder)
+                .map(|records| (records.time, Some(records)))
+                .map_err(|e| e.within(part))
         }
     }
 }

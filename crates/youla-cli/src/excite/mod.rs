@@ -154,6 +154,7 @@ pub(crate) fn make(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
     let about = || {
         let mut about = serde_json::json!(found.excited.summary);
         about["port"] = serde_json::json!(found.port);
+        about["cautions"] = serde_json::json!(found.cautions);
         about["files"] = files.iter().map(|path| path.display().to_string()).collect();
         about
     };

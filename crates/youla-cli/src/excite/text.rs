@@ -57,6 +57,7 @@ fn predicted(found: &RunExcitation) -> String {
     if !wrong.unstable.is_empty() {
         let _ = writeln!(text, "caution: the loop is not stable with {}", wrong.unstable.join(", "));
     }
+    found.cautions.iter().for_each(|told| text += &format!("caution: {told}\n"));
     text
 }
 

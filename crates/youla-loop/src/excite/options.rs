@@ -179,6 +179,9 @@ impl ExciteOptions {
             fits,
             "above the lowest and below half the sample rate",
         )?;
+        let periods = self.samples(ts)? as f64 * ts * low;
+        let must = "at least 1; make the excitation longer, or raise the lowest frequency of its band";
+        check("the length of the excitation in periods of its lowest frequency", periods, periods >= 1.0 - 1e-9, must)?;
         let part = |x: f64| (0.0..1.0).contains(&x);
         check(
             "the relative error of the nominal model",

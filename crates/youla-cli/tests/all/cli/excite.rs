@@ -1,6 +1,6 @@
 //! `youla excite`: files, limits, ports, refusals.
 
-use crate::common::{Outcome, SETTINGS, demo, empty_folder, settings, youla};
+use crate::common::{Outcome, SETTINGS, demo, empty_folder, loop_folder, settings, youla};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -144,7 +144,7 @@ fn what_is_missing_or_wrong_is_named() {
     )
     .expect("written");
     let other = |file: &'static str| USUAL.map(|word| if word == "run.toml" { file } else { word }).to_vec();
-    let cases: [(Vec<&str>, i32, &str); 9] = [
+    let cases: [(Vec<&str>, i32, &str); 10] = [
         (other("timed.toml"), 2, "states no sample_time, and the records, which would show it, cannot be read: "),
         (other("sign.toml"), 2, "the controller does not stabilise the nominal model: the closed loop has the pole "),
         (other("none.toml"), 2, "none.toml: no such file"),
@@ -153,6 +153,11 @@ fn what_is_missing_or_wrong_is_named() {
         (with(&["--noise-record", "quiet.csv"]), 2, "quiet.csv"),
         (with(&["--to", "xml"]), 2, "known are csv, c, mat"),
         (with(&["--limit-input", "1,2"]), 2, "the number of limits of the inputs is 2, but must be 1"),
+        (
+            vec!["excite", "run.toml", "--amplitude", "0.5", "--band", "1,20", "--samples", "10"],
+            2,
+            "in periods of its lowest frequency is 0.1, but must be at least 1; make the excitation longer",
+        ),
         (with(&["--ramp", "11"]), 2, "the ramp in seconds is 11, but must be "),
     ];
     for (arguments, code, sentence) in cases {
@@ -165,4 +170,17 @@ fn what_is_missing_or_wrong_is_named() {
         );
     }
     assert!(!folder.join("excite").exists());
+}
+
+/// An amplitude of another unit shows beside the log.
+#[test]
+fn a_huge_amplitude_is_said() {
+    let folder = loop_folder("excite-huge", &[]);
+    let of = |amplitude: &str| {
+        let arguments = USUAL.map(|word| if word == "0.5" { amplitude } else { word });
+        youla(&folder, &[&arguments[..], &["--force"]].concat()).stdout
+    };
+    assert!(!of("0.5").contains("caution"));
+    let told = of("500");
+    assert!(told.contains("caution: u [V] is predicted to reach ") && told.contains("check --amplitude"), "{told}");
 }

@@ -243,6 +243,15 @@ fn remove_own(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Whether a folder, or a folder that is not there yet, is one that a run has begun and not finished.
+pub fn is_partial(target: &Path) -> bool {
+    let name = target.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let begun = |entry: fs::DirEntry| entry.file_name().to_string_lossy().starts_with(&format!(".{name}.partial-"));
+    name.starts_with('.') && name.contains(".partial-")
+        || fs::read_dir(parent).into_iter().flatten().flatten().any(begun)
+}
+
 /// Removes unfinished folders whose writer has ended without removing them, and returns one whose writer has not, or of which the
 /// system does not tell.
 fn remove_left_over(parent: &Path, prefix: &str) -> Option<PathBuf> {

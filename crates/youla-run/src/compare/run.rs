@@ -31,8 +31,8 @@ impl FinishedRun {
     fn read(folder: &Path, place: usize, name: String, model: &str) -> Result<Self> {
         // The file of the recommended model has not the name of its method.
         let file = if model == Method::Likelihood.key() { "recommended" } else { model };
-        let system = model_for_export(folder, Some(file))?;
         let (report, summary) = (read_report(folder)?, Summary::read(folder)?);
+        let system = model_for_export(folder, Some(file))?;
         let scales = summary.channel_scales.value().map(|s| ChannelScales::new(s.inputs.clone(), s.outputs.clone()));
         let scales = scales.transpose()?;
         Ok(FinishedRun {

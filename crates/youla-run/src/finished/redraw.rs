@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
-use youla_io::folder::replace_file;
+use youla_io::folder::{is_partial, replace_file};
 use youla_report::{ReportData, html};
 
 /// Draws `report.html` of a run folder again from its `report.json` and returns its path.
@@ -27,6 +27,20 @@ pub(crate) fn read_report(run: &Path) -> Result<ReportData> {
         return Err(Error::File(youla_io::Error::NotAModel { path: run.to_owned(), problem }));
     }
     let data = run.join("report.json");
-    let text = youla_io::read_text(&data)?;
+    let unfinished = |problem| youla_io::Error::NotAModel { path: run.to_owned(), problem };
+    let text = youla_io::read_text(&data).map_err(|error| interrupted(run).map_or(error, unfinished))?;
     serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })
+}
+
+/// Of a folder without a report: whose it is, and the command that finishes it.
+fn interrupted(run: &Path) -> Option<String> {
+    let resumable = [("configuration.toml", "paper"), ("campaign.json", "commission")];
+    if let Some((_, verb)) = resumable.into_iter().find(|(file, _)| run.join(file).is_file()) {
+        let what = format!("this folder is of `youla {verb}`, not of `youla identify`, and has a page of its own");
+        return Some(format!(
+            "{what}; where it was interrupted, the same `youla {verb}` command with this --out resumes it"
+        ));
+    }
+    let again = "the run was interrupted or still runs; a run is written as a whole: start the same `youla identify` command again";
+    is_partial(run).then(|| again.to_owned())
 }

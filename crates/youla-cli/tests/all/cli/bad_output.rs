@@ -74,6 +74,14 @@ fn reports_of_no_run() {
     refuse("not the report.json of a run: missing field `title`");
     fs::write(folder.join("report.json"), "{\"title\": ").expect("written");
     refuse("EOF");
+    for (begun, run, says) in [
+        (".run.partial-7/.lock", "run", "start the same `youla identify` command again"),
+        ("paper/configuration.toml", "paper", "the same `youla paper` command with this --out resumes it"),
+    ] {
+        fs::create_dir(folder.join(begun).parent().expect("a folder")).expect("made");
+        fs::write(folder.join(begun), "").expect("written");
+        refused_by(Command::new(PROGRAM).args(["report", run]), &folder, 2, &[run, says]);
+    }
 }
 
 /// Places are tested before anything is computed: the message names the place, also where the input is bad.

@@ -2,6 +2,8 @@
 
 use super::run::FinishedRun;
 use crate::page::models;
+use youla::error::Seconds;
+use youla::signal::Channel;
 use youla_report::data::{EvidenceTable, Mode, Note, ReportData, Status, Verdict};
 use youla_report::match_modes;
 use youla_report::numbers::fit;
@@ -89,19 +91,28 @@ fn difference(from: &Mode, to: &Mode) -> String {
 pub(super) fn notes(runs: &[FinishedRun]) -> Vec<Note> {
     let first = &runs[0];
     let mut all = Vec::new();
+    let channels =
+        |r: &ReportData| r.inputs.iter().chain(&r.outputs).map(Channel::label).collect::<Vec<_>>().join(", ");
+    let time = |r: &ReportData| r.sample_time.map_or("no".into(), |ts| Seconds(ts).to_string());
     let mut add = |text: String| all.push(Note { status: Status::Caution, text });
     for run in &runs[1..] {
         let (a, b) = (&first.report, &run.report);
         if (&a.inputs, &a.outputs) != (&b.inputs, &b.outputs) {
             add(format!(
-                "{} has channels of other names or units than {}: they are compared by their position.",
-                run.name, first.name
+                "{} has the channels {}, {} has {}: they are compared by their position.",
+                run.name,
+                channels(b),
+                first.name,
+                channels(a)
             ));
         }
         if a.sample_time != b.sample_time {
             add(format!(
-                "{} has another sample time than {}: poles are drawn in the s plane, and there is no nu-gap.",
-                run.name, first.name
+                "{} has a sample time of {} s, {} has {} s: poles are drawn in the s plane, and there is no nu-gap.",
+                run.name,
+                time(b),
+                first.name,
+                time(a)
             ));
         }
         let files = |r: &ReportData| {

@@ -44,6 +44,18 @@ fn two_runs_stand_side_by_side() {
     assert_eq!(predictions.as_array().map(Vec::len), Some(2), "both runs were verified on the same samples");
     let page = fs::read_to_string(folder.join("comparison.html")).expect("written");
     assert!(page.contains("Differences of modes") && !page.contains("Can I trust it?"));
+    let other = fs::read_to_string(folder.join("two/report.json")).expect("written");
+    let other = other
+        .replace(r#"{"name":"u","unit":"V"}"#, r#"{"name":"v","unit":"V"}"#)
+        .replace("\"sample_time\":0.01", "\"sample_time\":0.02");
+    fs::write(folder.join("two/report.json"), other).expect("written");
+    let found = youla(&folder, &["compare", "three", "two", "--force"]).stdout;
+    for text in [
+        "two has the channels v [V], y [um], three has u [V], y [um]:",
+        "two has a sample time of 0.02 s, three has 0.01 s:",
+    ] {
+        assert!(found.contains(text), "{text} is missing in\n{found}");
+    }
 }
 
 #[test]

@@ -57,7 +57,8 @@ def identify(
     hold : {"tustin", "zoh"}, optional
         How a controller in continuous time was discretised; needed there, and only there.
     verify : Record or sequence of Record, optional
-        Records to verify on; never used to identify.
+        Records to verify on: no model is fitted to them. Where they differ from the model its region is wider, and they may decide
+        between two models.
     name : str, optional
         Name of the machine; that of the first record when absent.
     **options : mapping

@@ -54,7 +54,7 @@ pub struct DataSettings {
     /// `y/d re` and `y/d im` (or `abs` or `dB` with `deg`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub response: Vec<DataFile>,
-    /// Records to verify on; never used for identification.
+    /// Records to verify on: no model is fitted to them. Where they differ from the model its region is wider, and they may decide between two models.
     #[serde(default)]
     pub verification: Vec<DataFile>,
 }

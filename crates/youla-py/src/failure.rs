@@ -12,17 +12,23 @@ pub(crate) const OPTIONS: &str = "options";
 pub(crate) struct Failure {
     kind: ErrorKind,
     message: String,
+    /// Whether a file is meant: then the words of run.toml are the right ones.
+    of_file: bool,
 }
 
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
 impl Failure {
     pub(crate) fn input(message: impl Into<String>) -> Self {
-        Failure { kind: ErrorKind::BadInput, message: message.into() }
+        Failure { kind: ErrorKind::BadInput, message: message.into(), of_file: false }
     }
 
     pub(crate) fn numerical(message: impl Into<String>) -> Self {
-        Failure { kind: ErrorKind::Numerical, message: message.into() }
+        Failure { kind: ErrorKind::Numerical, message: message.into(), of_file: false }
+    }
+
+    pub(crate) fn of_file(self) -> Self {
+        Failure { of_file: true, ..self }
     }
 }
 
@@ -30,7 +36,7 @@ macro_rules! refused {
     ($($error:ty),*) => {$(
         impl From<$error> for Failure {
             fn from(error: $error) -> Self {
-                Failure { kind: error.kind(), message: error.to_string() }
+                Failure { kind: error.kind(), message: error.to_string(), of_file: false }
             }
         }
     )*};
@@ -47,7 +53,8 @@ impl From<youla_io::Error> for Failure {
             }
             other => other.to_string(),
         };
-        Failure { kind: error.kind(), message }
+        let of_file = matches!(&error, youla_io::Error::Settings { path, .. } if path != Path::new(OPTIONS));
+        Failure { kind: error.kind(), message, of_file }
     }
 }
 
@@ -55,7 +62,7 @@ impl From<youla_run::Error> for Failure {
     fn from(error: youla_run::Error) -> Self {
         match error {
             youla_run::Error::File(of_file) => of_file.into(),
-            other => Failure { kind: other.kind(), message: other.to_string() },
+            other => Failure { kind: other.kind(), message: other.to_string(), of_file: false },
         }
     }
 }
@@ -73,7 +80,12 @@ impl From<Failure> for PyErr {
             ErrorKind::Numerical => "NumericalError",
         };
         Python::attach(|py| {
-            let raised = py.import("youla._errors").and_then(|m| m.getattr(class)?.call1((failure.message,)));
+            let words = |told: String| match failure.of_file {
+                true => Ok(told),
+                false => py.import("youla._options")?.getattr("in_python")?.call1((told,))?.extract(),
+            };
+            let told = words(failure.message);
+            let raised = told.and_then(|told| py.import("youla._errors")?.getattr(class)?.call1((told,)));
             raised.map_or_else(|error| error, PyErr::from_value)
         })
     }

@@ -52,7 +52,11 @@ pub(crate) fn identify(
 pub(crate) fn identify_file(py: Python<'_>, path: PathBuf) -> PyResult<Run> {
     worker::run(py, false, move |stop| {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        pipeline(read_settings(&path)?, &folder, stop, |chosen| Ok(read_records(&chosen.data, &folder)?))
+        let read = |chosen: &RunSettings| Ok(read_records(&chosen.data, &folder)?);
+        read_settings(&path)
+            .map_err(Failure::from)
+            .and_then(|chosen| pipeline(chosen, &folder, stop, read))
+            .map_err(Failure::of_file)
     })
 }
 

@@ -86,7 +86,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "share beyond 1": (lambda: rec().split(1.5), "share is 1.5, but must be between 0 and 1"),
     # loop
     "no controller": (lambda: ident(controller=None), "controller is missing; give 0 where no controller ran"),
-    "no nominal": (lambda: ident(nominal=None, hansen={}), "deviation from a nominal model; add [nominal]"),
+    "no nominal": (lambda: ident(nominal=None, hansen={}), "deviation from a nominal model; add nominal="),
     "wrong feedback": (lambda: ident(feedback="minus"), "feedback is 'minus', but must be 'negative'"),
     "text as a controller": (lambda: ident(controller=object()), "controller is a object, but must be"),
     "form of a controller": (lambda: ident(controller={"pdi": {}}), "exactly one key of difference_equation"),
@@ -106,7 +106,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "unknown option": (lambda: ident(hanson={}), "identify has no argument 'hanson'; did you mean 'hansen'?"),
     "option is no mapping": (lambda: ident(hansen=8), "hansen is int, but must be a mapping"),
     "unknown key": (lambda: ident(hansen={"horizn": 20}), "horizon"),
-    "value of a wrong type": (lambda: ident(hansen={"order": "many"}), "[hansen]"),
+    "value of a wrong type": (lambda: ident(hansen={"order": "many"}), "hansen={'order': ...} is \"many\", but must be a whole number"),
     "option that is no number": (lambda: ident(hansen={"order": object()}), "hansen.order is <object"),
     "run.toml with arguments": (lambda: youla.identify("run.toml", nominal=1.0), "a run.toml states everything"),
     # models and results

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +84,11 @@ CASES = {
     "samples that verify": (lambda run: (lambda r: youla.identify(r, verify=r[100:200], **KNOWN))(log()), "share samples 100 to 199 of the first.*they would verify nothing"),
     "a copy that verifies": (lambda run: youla.identify(log(), verify=log(TABLE.copy()), **KNOWN), "share all samples"),
     "time in ms": (lambda run: youla.Record({"t_ms": [0, 1, 2], "u": [1, 2, 3], "y": [1, 3, 2]}, inputs="u", outputs="y", time="t_ms"), r"time 't_ms' is in milliseconds by its name.*data\['t_ms'\] / 1e3.*dt="),
+    "key of a controller": (lambda run: youla.identify(log(), controller={"pid": {"Kp": 1.0, "discretisation": "tustin"}}, feedback="negative"), "`Kp` is not a key of controller={'pid': ...}"),
+    "order as text": (lambda run: youla.identify(log(), **KNOWN, recommended={"order": "4"}), "recommended={'order': ...} is \"4\", but must be"),
+    "no nominal model": (lambda run: youla.identify(log(), **{**KNOWN, "nominal": None}), "hansen= identifies the deviation from a nominal model; add nominal="),
+    "no such trend": (lambda run: youla.identify(log(), **KNOWN, data={"detrend": "constant"}), "not a choice of data={'detrend': ...}"),
+    "key of another table": (lambda run: youla.identify(log(), **KNOWN, verification={"order": 3}), "`order` is a key of recommended= and direct= and hansen="),
     "key of excite": (lambda run: youla.excite(run.recommended, 2.0, feedback="negative", **SHORT, shap=1), "excite has no argument 'shap'"),
 }
 
@@ -93,6 +99,7 @@ def test_a_misuse_is_told_in_words_of_python(case: str, run: youla.Run) -> None:
     with pytest.raises(youla.InputError, match=says) as told:
         call(run)
     assert "run.toml" not in str(told.value)
+    assert not re.search(r"\[(data|controller|nominal|recommended|hansen|verification)\b", str(told.value))
 
 
 def test_an_existing_folder_names_replace(run: youla.Run, tmp_path: Path) -> None:

@@ -85,13 +85,28 @@ def _check_pid(limits: dict[str, Any]) -> None:
         raise InputError(f"pid['phase_margin'] is {phase:g}, but is in degrees: give at least {_LEAST_PHASE:g}, such as 40, or 0 for no limit")
 
 
+#: Words of run.toml and of the command line, and those of this package for them, in this order.
+_TABLES = "|".join([*(name for name in OPTIONS if name != "data"), "controller", "nominal"])
+_IN_PYTHON = (
+    (r"`?--[\w-]+`?, or |, --[\w-]+(?=\))| to run\.toml", ""),
+    *(
+        # Not where a column of the user's has the name.
+        (rf"(?<=\[data\] ){key}\b|(?<=`){key}(?=`)|(?<=check ){key}\b|(?<=excitation: ){key}\b|\b{key}(?= in \[data\])|(?<=\(){key}(?=\))", ours)
+        for key, ours in (("input_excitation", "excitation"), ("sample_time", "dt"), ("time_column", "time"))
+    ),
+    (r"`?(detrend|disturbance)`? in \[data\]|\[data\] (detrend|disturbance)\b", r"data={'\1\2': ...}"),
+    (r" in \[data\]", " of the record"), (r"\[data\] (has|lists|names|states)\b", r"the record \1"), (r"\[data\] (\w+)", r"\1 of the record"), (r"\[data\]", "the record"),
+    (r"`?(feedback|hold)`? in \[controller\]|\[controller\] (feedback|hold)\b|`(\w+)` in \[excite\]", r"\1\2\3="),
+    (rf"`(\w+)` in \[({_TABLES})\]", r"\2={'\1': ...}"), (rf"\[({_TABLES})\] (\w+_\w+|\w+(?= = ))", r"\1={'\2': ...}"),
+    (rf"\[({_TABLES})\.(\w+)\]", r"\1={'\2': ...}"), (rf"\[({_TABLES})\](?=:)", r"\1"), (rf"\[({_TABLES})\]", r"\1="),
+)  # fmt: skip
+
+
 def in_python(told: str) -> str:
     """What is said in words of run.toml and of the command line, with the arguments of this package."""
-    told = re.sub(r"`(\w+)` in \[controller\]", r"\1=", told)
-    told = re.sub(r"`--[\w-]+`, or ", "", told)
-    names = "|".join([*OPTIONS, "controller", "nominal"])
-    told = re.sub(rf"\[({names})\.(\w+)\]", r"\1={'\2': ...}", told)
-    return re.sub(rf"\[({names})\]", r"\1=", told)
+    for words, ours in _IN_PYTHON:
+        told = re.sub(words, ours, told)
+    return told
 
 
 def plain(value: Any, where: str = "an option") -> Any:

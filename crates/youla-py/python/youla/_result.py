@@ -16,6 +16,7 @@ from ._figures import Plots
 from ._kept import Kept, Results, files_of, read_folder
 from ._model import FrequencyResponse, Mode, Model, RealPole, _model_of, frequencies
 from ._names import RECOMMENDED, key_of, label_of
+from ._options import in_python
 from ._optional import need
 from ._pages import place_of_page
 from ._verdict import Evidence, Prediction, Verdict, VerdictTest, defect
@@ -133,7 +134,7 @@ class Run:
     @cached_property
     def verdict(self) -> Verdict:
         """Whether the recommended model can be trusted, with the evidence."""
-        lines = tuple(str(line["text"]) for line in self._page["verdict"])
+        lines = tuple(in_python(line["text"]) for line in self._page["verdict"])
         defects = tuple(defect(f) for f in self._page.get("findings", ()) if f["status"] == "bad")
         found = self.summary["recommended"]
         if found is None:

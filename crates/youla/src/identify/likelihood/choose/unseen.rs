@@ -136,7 +136,8 @@ mod tests {
     }
 
     /// Beside an excitation that shows the response at its frequency, cogging is no mode of the drive, of whose margin the region would take more
-    /// than half: it is named in at least two of five records, and the model is trusted in all, with deviations that hold.
+    /// than half: the model is trusted in five of five records, with deviations that hold, and where it is named it is not in the model. With a gain
+    /// of its own for the noise the model with a mode for it passes its tests as well in most records.
     #[test]
     fn cogging_beside_an_excitation_is_left_to_the_noise() {
         let time = Discrete::new(1e-3).unwrap();
@@ -155,9 +156,13 @@ mod tests {
             let options = LikelihoodOptions::default();
             let found = recommend(&[estimation], &[fresh], Some(&known), time, &options).unwrap();
             assert!(found.trusted(), "seed {seed}: {:?}", found.reasons());
-            let Some(unseen) = found.evidence.iter().find(|e| e.question.ends_with("(unseen modes)")) else { continue };
-            named += 1;
-            assert!(found.order == 2 && ["at 29.", "at 30."].iter().any(|at| unseen.note.starts_with(at)), "{unseen}");
+            if let Some(unseen) = found.evidence.iter().find(|e| e.question.ends_with("(unseen modes)")) {
+                named += 1;
+                assert!(
+                    found.order == 2 && ["at 29.", "at 30."].iter().any(|at| unseen.note.starts_with(at)),
+                    "{unseen}"
+                );
+            }
             for share in [0.002, 0.005, 0.01, 0.02, 0.05, 0.1] {
                 let z = c64::cis(TAU * share);
                 let truth = 0.01 / ((z - 1.0) * (z - 0.995));
@@ -168,6 +173,6 @@ mod tests {
                 assert!(error < 2.5 * deviation, "seed {seed}, {share}: {error} {deviation}");
             }
         }
-        assert!(named >= 2, "{named}");
+        assert!(named >= 1, "{named}");
     }
 }

@@ -9,7 +9,7 @@
 
 use super::block::Block;
 use super::chart::Chart;
-use super::driven::{Joint, LINES, Responses, hidden, longest, places_of, stabilised, states_of};
+use super::driven::{Joint, LINES, Responses, hidden, longest, states_of};
 use super::feedthrough;
 use super::groups::grouped;
 use super::linearise::{Linearised, MOST_COEFFICIENTS, linearise_free};
@@ -33,13 +33,14 @@ const LARGEST_POLE: f64 = 1.0 - 1e-5;
 /// Ridge of a start, relative to its diagonal.
 const RIDGE: f64 = 1e-9;
 
+/// Gains, and the pole of colours.
+type Gains = (Mat<f64>, Option<f64>);
+
 /// A model, its gains, its value and the noise there.
 struct At {
     point: Point,
-    /// Of the states, then of the colours.
-    gain: Mat<f64>,
-    /// Pole of the colours.
-    colour: Option<f64>,
+    /// Those of the states, then of the colours, and the pole of these.
+    gains: Gains,
     value: f64,
     noise: Noise,
 }
@@ -73,7 +74,7 @@ pub(crate) fn with_free_gain(spectra: &Spectra, found: &Found, options: &SearchO
     let of_ends = ends.min_by(|a, b| a.0.criterion(near.spectra).total_cmp(&b.0.criterion(near.spectra)));
     let (mut at, mut steps) = of_ends?;
     if groups.is_some() {
-        let (last, taken) = search.descended(search.at(at.point, (at.gain, at.colour), &at.noise.covariance)?);
+        let (last, taken) = search.descended(search.at(at.point, at.gains, &at.noise.covariance)?);
         (at, steps) = (last, steps + taken);
     }
     let At { point, noise, value, .. } = at;
@@ -146,20 +147,15 @@ impl Search<'_> {
 
     /// Value and noise, given about the covariance of the innovations; `None` where no filter is stable, and where it has more coefficients than
     /// columns.
-    fn at(&self, point: Point, (gain, colour): (Mat<f64>, Option<f64>), size: &Mat<f64>) -> Option<At> {
-        let gain = stabilised(&point.model, &self.hidden, (gain, colour), size)?;
-        let joint = Arc::new(Joint::of_gain(&point.model, &self.hidden, (gain.clone(), colour), size)?);
+    fn at(&self, point: Point, gains: Gains, size: &Mat<f64>) -> Option<At> {
+        let joint = Arc::new(Joint::of_gain(&point.model, &self.hidden, gains, size)?);
+        let gains = (joint.kalman.gains(), joint.kalman.entry.colour);
         let rest = joint.rest(self.spectra, &point.residuals(self.spectra));
         let noise = Noise::behind(self.spectra, &rest, self.options.noise_order, Some(joint));
         let of_loop = 2.0 * self.spectra.samples() as f64 * feedthrough::log_loop(&point.model, &self.options.direct);
         let value = of_noise(self.spectra, &noise, &point.model) - of_loop;
-        (value.is_finite() && noise.parameters() <= MOST_COEFFICIENTS).then_some(At {
-            point,
-            gain,
-            colour,
-            value,
-            noise,
-        })
+        let usable = value.is_finite() && noise.parameters() <= MOST_COEFFICIENTS;
+        usable.then_some(At { point, gains, value, noise })
     }
 
     /// A step that lowers the value.
@@ -169,9 +165,12 @@ impl Search<'_> {
         let Linearised { factor, ends } = linearise_free(self.spectra, &at.point, &chart, &at.noise);
         let slope = super::slope(self.spectra, &at.point, (&chart, &at.noise), (options, true));
         let factor = with_slope(factor, &slope);
-        let (p, all) = (at.gain.ncols(), factor.ncols() - 1);
-        let places = places_of(&at.point.model, &self.hidden, at.gain.nrows());
-        let of_colour = usize::from(at.colour.is_some());
+        let (gain, colour) = &at.gains;
+        let (model, p, all) = (&at.point.model, gain.ncols(), factor.ncols() - 1);
+        let mut places = states_of(model, &self.hidden);
+        places.extend(model.order()..gain.nrows());
+        // Criteria, for the autoregressions have an order of their own at each trial.
+        let now = at.criterion(self.spectra);
         damping.descend(|damping| {
             let (step, promised) = damped(&factor, all, damping);
             if promised.is_nan() || promised <= options.tolerance {
@@ -179,24 +178,16 @@ impl Search<'_> {
             }
             let point = moved(&at.point, &chart, &ends, &step);
             // The entries of K come last, state by state, and behind them the pole of the colours.
-            let of_gain = &step[all - of_colour - places.len() * p..all - of_colour];
-            let colour = at.colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE));
-            let mut gain = at.gain.clone();
-            for (x, change) in of_gain.iter().enumerate() {
-                gain[(places[x / p], x % p)] += change;
+            let mut moved = (gain.clone(), colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE)));
+            let last = all - usize::from(colour.is_some());
+            for (x, change) in step[last - places.len() * p..last].iter().enumerate() {
+                moved.0[(places[x / p], x % p)] += change;
             }
             let inside = point.model.poles().iter().all(|pole| pole.norm() <= options.radius);
-            // The autoregressions have an order of their own at each trial.
-            let now = at.criterion(self.spectra);
-            match self
-                .at(point, (gain, colour), &at.noise.covariance)
-                .filter(|trial| inside && trial.criterion(self.spectra) < now)
-            {
-                Some(trial) => {
-                    let ratio = (now - trial.criterion(self.spectra)) / promised;
-                    Trial::Lower { point: trial, ratio }
-                }
-                None => Trial::Rejected,
+            let trial = self.at(point, moved, &at.noise.covariance).filter(|_| inside);
+            match trial.map(|trial| (now - trial.criterion(self.spectra), trial)) {
+                Some((gain, trial)) if gain > 0.0 => Trial::Lower { point: trial, ratio: gain / promised },
+                _ => Trial::Rejected,
             }
         })
     }

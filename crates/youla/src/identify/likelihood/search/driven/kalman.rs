@@ -132,23 +132,29 @@ impl Kalman {
 }
 
 impl Kalman {
-    /// Of gains that are free but for the states of hidden blocks, those of the model, then those of the colours; `None` where `A - K C` is not
-    /// stable.
+    /// Of gains that are free but for the states of hidden blocks, those of the model, then those of the colours with their pole, and about the
+    /// covariance of the innovations. Gains that leave `A - K C` unstable are replaced by those of the same spectrum, by the Riccati equation of
+    /// `K epsilon`; `None` where it has no solution.
     pub(super) fn of_gain(
         model: &Model,
         hidden: &[usize],
-        (gain, colour): (Mat<f64>, Option<f64>),
+        (mut gain, colour): (Mat<f64>, Option<f64>),
         size: &Mat<f64>,
     ) -> Option<Self> {
         let (n, m, p) = (model.order(), model.inputs, gain.ncols());
-        let (System { a, c, .. }, own) =
-            (System::new(&model.without(hidden), 0..p, colour), rows_of(model, hidden, &gain));
-        let zeros = eigenvalues("the noise", (a - own * c).as_ref()).ok()?;
+        let (plant, free) = (model.without(hidden), states_of(model, hidden));
+        let System { a, c, .. } = System::new(&plant, 0..p, colour);
+        let places: Vec<usize> = free.iter().copied().chain(n..gain.nrows()).collect();
+        let own = Mat::from_fn(places.len(), p, |i, o| gain[(places[i], o)]);
+        let zeros = eigenvalues("the noise", (&a - &own * &c).as_ref()).ok()?;
         if zeros.iter().any(|zero| zero.norm() >= 1.0) {
-            return None;
+            let (q, s) = (&own * size * own.transpose(), &own * size);
+            let (a, b, s) = (a.transpose(), c.transpose(), Some(s.as_ref()));
+            let dual = RiccatiProblem { a, b, q: q.as_ref(), r: size.as_ref(), s };
+            let own = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
+            places.iter().enumerate().for_each(|(i, place)| gain.row_mut(*place).copy_from(own.row(i)));
         }
-        let unstable = model.without(hidden).poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
-        let free = states_of(model, hidden);
+        let unstable = plant.poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
         let entry = Entry { inputs: vec![1.0; m], sensors: vec![1.0; p], colour, free };
         let (covariance, size, b) = (Mat::zeros(0, 0), size.clone(), model.matrices().1);
         let of_colour = gain.subrows(n, gain.nrows() - n).to_owned();
@@ -179,36 +185,4 @@ pub(crate) fn states_of(model: &Model, hidden: &[usize]) -> Vec<usize> {
         if hidden.contains(&k) { 0..0 } else { states }
     };
     (0..model.blocks.len()).flat_map(&mut of_block).collect()
-}
-
-/// The rows of the states of a model without those of some blocks, and those behind them.
-pub(crate) fn places_of(model: &Model, hidden: &[usize], rows: usize) -> Vec<usize> {
-    states_of(model, hidden).into_iter().chain(model.order()..rows).collect()
-}
-
-fn rows_of(model: &Model, hidden: &[usize], gain: &Mat<f64>) -> Mat<f64> {
-    let places = places_of(model, hidden, gain.nrows());
-    Mat::from_fn(places.len(), gain.ncols(), |i, o| gain[(places[i], o)])
-}
-
-/// The gains of the same spectrum for which `A - K C` is stable, by the Riccati equation of `K epsilon` with innovations of a covariance.
-pub(crate) fn stabilised(
-    model: &Model,
-    hidden: &[usize],
-    (mut gain, colour): (Mat<f64>, Option<f64>),
-    size: &Mat<f64>,
-) -> Option<Mat<f64>> {
-    let System { a, c, .. } = System::new(&model.without(hidden), 0..gain.ncols(), colour);
-    let own = rows_of(model, hidden, &gain);
-    let zeros = eigenvalues("the noise", (&a - &own * &c).as_ref()).ok()?;
-    if zeros.iter().all(|zero| zero.norm() < 1.0) {
-        return Some(gain);
-    }
-    let (q, s) = (&own * size * own.transpose(), &own * size);
-    let (a, b, s) = (a.transpose(), c.transpose(), Some(s.as_ref()));
-    let dual = RiccatiProblem { a, b, q: q.as_ref(), r: size.as_ref(), s };
-    let own = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
-    let places = places_of(model, hidden, gain.nrows());
-    places.iter().enumerate().for_each(|(i, place)| gain.row_mut(*place).copy_from(own.row(i)));
-    Some(gain)
 }

@@ -13,6 +13,7 @@ use crate::identify::likelihood::deviation::root::Root;
 use crate::identify::likelihood::deviation::{grid, inverse_root};
 use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::free_gain::with_gain_of;
 use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
 use crate::identify::likelihood::search::model::Model;
@@ -292,6 +293,8 @@ fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) ->
     let spectra = spectra.thinned(every);
     let start = with_best_ends(&spectra, choice.found.point.model.clone(), &choice.found.noise);
     let problem = problem.with_feedthrough(choice.found.feedthrough);
-    let found = search(&spectra, start, &problem.options(STEPS, 1.0, &choice.delays))?;
+    let options = problem.options(STEPS, 1.0, &choice.delays);
+    let of_gain = with_gain_of(&choice.found, &spectra, &start, &options);
+    let found = of_gain.or_else(|| search(&spectra, start, &options))?;
     Some((found.point.model, every as f64))
 }

@@ -83,6 +83,19 @@ pub(crate) fn with_free_gain(spectra: &Spectra, found: &Found, options: &SearchO
     (freed.criterion(samples) < found.criterion(samples)).then_some(freed)
 }
 
+/// The model of a part of the records, from that of all with such a gain; `None` where that has none.
+pub(crate) fn with_gain_of(all: &Found, spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<Found> {
+    let kalman = &all.noise.joint.as_ref()?.kalman;
+    if kalman.entry.free.is_empty() {
+        return None;
+    }
+    let hidden = hidden(&start.model, longest(spectra), 0..start.model.outputs);
+    let (search, gains) = (Search { spectra, options, hidden }, (kalman.gains(), kalman.entry.colour));
+    let (At { point, noise, value, .. }, steps) =
+        search.descended(search.at(start.clone(), gains, &all.noise.covariance)?);
+    Some(Found { point, noise, deviance: value, steps, ..all.clone() })
+}
+
 impl At {
     /// Schwarz's, up to what the model adds.
     fn criterion(&self, spectra: &Spectra) -> f64 {

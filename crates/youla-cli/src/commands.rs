@@ -32,11 +32,11 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
         Command::Identify(args) => {
             let (settings, folder) = args.settings()?;
             if let (Some(limit), Some(order)) = (settings.recommended.time_limit, settings.recommended.order) {
-                let told = format!(
+                let note = format!(
                     "note: the time limit of {limit} s ends the choice of order and dead time; order = {order} is fixed in [recommended], and the \
                      search of a model of that order ends first, however long it takes"
                 );
-                Progress::new(form.is_silent()).say(&told);
+                Progress::new(form.is_silent()).say(&note);
             }
             identify_and_write(form, &args.output_folder, &folder, settings, |s| read_records(&s.data, &folder))
         }

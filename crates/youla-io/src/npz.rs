@@ -79,12 +79,16 @@ fn variables(mut file: impl Read + Seek, path: &Path) -> Result<Variables> {
 fn foreign(holds: impl Fn(&str) -> bool) -> Option<(&'static str, &'static str)> {
     let sheet =
         "save the sheet with the log as CSV, or read it in Python with pandas.read_excel and give the data frame";
-    match () {
-        () if holds(".npy") => None,
-        () if holds("xl/workbook.xml") || holds("xl/workbook.bin") => Some(("an Excel workbook", sheet)),
-        () if holds("META-INF/manifest.xml") => Some(("an OpenDocument file", sheet)),
-        () => Some(("a zip archive without NumPy arrays", "unpack it and give the file with the log")),
+    if holds(".npy") {
+        return None;
     }
+    let kinds = [
+        ("xl/workbook.xml", "an Excel workbook"),
+        ("xl/workbook.bin", "an Excel workbook"),
+        ("META-INF/manifest.xml", "an OpenDocument file"),
+    ];
+    let kind = kinds.into_iter().find(|(name, _)| holds(name)).map(|(_, found)| (found, sheet));
+    Some(kind.unwrap_or(("a zip archive without NumPy arrays", "unpack it and give the file with the log")))
 }
 
 /// Type, order and shape of an array.

@@ -108,13 +108,13 @@ fn beyond(excited: &Excited, records: &[LoopRecord]) -> Vec<String> {
     let of = |(j, predicted): (usize, &PredictedPeak)| {
         let most = records.iter().map(|of| logged(j, of)).fold(0.0, f64::max);
         let (peak, label) = (figure(predicted.peak), predicted.channel.label());
-        let told = || {
+        let caution = || {
             format!(
                 "{label} is predicted to reach {peak}, in the log it reaches {}: check --amplitude and its unit",
                 figure(most)
             )
         };
-        (most > 0.0 && predicted.peak > BEYOND * most).then(told)
+        (most > 0.0 && predicted.peak > BEYOND * most).then(caution)
     };
     excited.summary.predicted.iter().enumerate().filter_map(of).collect()
 }

@@ -286,13 +286,13 @@ fn is_blank(cell: &[u8]) -> bool {
 /// A finite number, perhaps in quotes and with blanks around it; of a date with a time the seconds since 1970.
 fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
     let text = unquoted(cell)?;
-    let value: f64 = match decimal {
-        _ if text.contains(':') => instant(text)?,
-        DecimalSign::Point => text.parse().ok()?,
-        DecimalSign::Comma if text.contains('.') => return None,
-        DecimalSign::Comma => text.replacen(',', ".", 1).parse().ok()?,
+    let value: Option<f64> = match decimal {
+        DecimalSign::Point => text.parse().ok(),
+        DecimalSign::Comma if text.contains('.') => None,
+        DecimalSign::Comma => text.replacen(',', ".", 1).parse().ok(),
     };
-    Some(value).filter(|x| x.is_finite())
+    // Few cells are no numbers, so that numbers are not searched for the signs of a date.
+    value.or_else(|| instant(text)).filter(|x| x.is_finite())
 }
 
 /// Seconds since 1970 of a date with a time such as `2026-03-01T10:00:00.25Z`; without an offset as if it were UTC.

@@ -27,7 +27,7 @@ pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path, at: &str
     problem_at(path, text, start, problem)
 }
 
-/// The table of a key that stands where one of several forms is chosen and belongs elsewhere.
+/// The table to which a key belongs that is given where one of several forms is chosen.
 fn stray(message: &str, document: &toml::Table) -> String {
     let chosen = ["controller", "nominal"].into_iter().filter(|_| message.starts_with("wanted exactly 1 element"));
     let keys = chosen.filter_map(|table| document.get(table)?.as_table()).flat_map(|table| table.keys());

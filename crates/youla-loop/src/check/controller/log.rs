@@ -195,7 +195,7 @@ mod tests {
         assert!(log.residual(&k.negated(), &log.e, &log.w).unwrap() > 0.1);
     }
 
-    /// Another column is told beside the controller that ran, and nothing of the excitation beside one of another unit.
+    /// Another column is found beside the controller that ran; beside a controller of another unit nothing is said of the excitation.
     #[test]
     fn the_excitation_is_compared_where_it_matters() {
         let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);

@@ -9,15 +9,14 @@
 
 use super::block::Block;
 use super::chart::Chart;
-use super::driven::{Joint, LINES, Responses, hidden, longest, states_of};
-use super::feedthrough;
+use super::driven::{Joint, LINES, Responses, hidden, longest, places_of, states_of};
 use super::groups::grouped;
 use super::linearise::{Linearised, MOST_COEFFICIENTS, linearise_free};
 use super::model::Model;
 use super::noise::Noise;
 use super::point::Point;
 use super::separable::separable;
-use super::{DAMPED, FIRST_DAMPING, Found, SearchOptions, damped, moved, of_noise, with_slope};
+use super::{DAMPED, FIRST_DAMPING, Found, SearchOptions, damped, moved, penalty, value_of, with_slope};
 use crate::identify::likelihood::data::lanes::Lanes;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{Damping, Trial};
@@ -77,8 +76,7 @@ pub(crate) fn with_free_gain(spectra: &Spectra, found: &Found, options: &SearchO
         let (last, taken) = search.descended(search.at(at.point, at.gains, &at.noise.covariance)?);
         (at, steps) = (last, steps + taken);
     }
-    let At { point, noise, value, .. } = at;
-    let freed = Found { point, noise, deviance: value, steps: found.steps + steps, ..found.clone() };
+    let freed = at.found(found, found.steps + steps);
     let samples = spectra.samples();
     (freed.criterion(samples) < found.criterion(samples)).then_some(freed)
 }
@@ -91,15 +89,19 @@ pub(crate) fn with_gain_of(all: &Found, spectra: &Spectra, start: &Point, option
     }
     let hidden = hidden(&start.model, longest(spectra), 0..start.model.outputs);
     let (search, gains) = (Search { spectra, options, hidden }, (kalman.gains(), kalman.entry.colour));
-    let (At { point, noise, value, .. }, steps) =
-        search.descended(search.at(start.clone(), gains, &all.noise.covariance)?);
-    Some(Found { point, noise, deviance: value, steps, ..all.clone() })
+    let (at, steps) = search.descended(search.at(start.clone(), gains, &all.noise.covariance)?);
+    Some(at.found(all, steps))
 }
 
 impl At {
     /// Schwarz's, up to what the model adds.
     fn criterion(&self, spectra: &Spectra) -> f64 {
-        self.value + (spectra.samples().max(2) as f64).ln() * self.noise.parameters() as f64
+        self.value + penalty(self.noise.parameters(), spectra.samples(), &self.point)
+    }
+
+    /// As what a search found after so many steps, with what it has in common with another.
+    fn found(self, like: &Found, steps: usize) -> Found {
+        Found { point: self.point, noise: self.noise, deviance: self.value, steps, ..like.clone() }
     }
 }
 
@@ -165,8 +167,7 @@ impl Search<'_> {
         let gains = (joint.kalman.gains(), joint.kalman.entry.colour);
         let rest = joint.rest(self.spectra, &point.residuals(self.spectra));
         let noise = Noise::behind(self.spectra, &rest, self.options.noise_order, Some(joint));
-        let of_loop = 2.0 * self.spectra.samples() as f64 * feedthrough::log_loop(&point.model, &self.options.direct);
-        let value = of_noise(self.spectra, &noise, &point.model) - of_loop;
+        let value = value_of(self.spectra, &noise, &point.model, self.options);
         let usable = value.is_finite() && noise.parameters() <= MOST_COEFFICIENTS;
         usable.then_some(At { point, gains, value, noise })
     }
@@ -180,8 +181,7 @@ impl Search<'_> {
         let factor = with_slope(factor, &slope);
         let (gain, colour) = &at.gains;
         let (model, p, all) = (&at.point.model, gain.ncols(), factor.ncols() - 1);
-        let mut places = states_of(model, &self.hidden);
-        places.extend(model.order()..gain.nrows());
+        let places = places_of(model, &self.hidden, gain.nrows());
         // Criteria, for the autoregressions have an order of their own at each trial.
         let now = at.criterion(self.spectra);
         damping.descend(|damping| {
@@ -191,13 +191,13 @@ impl Search<'_> {
             }
             let point = moved(&at.point, &chart, &ends, &step);
             // The entries of K come last, state by state, and behind them the pole of the colours.
-            let mut moved = (gain.clone(), colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE)));
+            let mut gains = (gain.clone(), colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE)));
             let last = all - usize::from(colour.is_some());
             for (x, change) in step[last - places.len() * p..last].iter().enumerate() {
-                moved.0[(places[x / p], x % p)] += change;
+                gains.0[(places[x / p], x % p)] += change;
             }
             let inside = point.model.poles().iter().all(|pole| pole.norm() <= options.radius);
-            let trial = self.at(point, moved, &at.noise.covariance).filter(|_| inside);
+            let trial = self.at(point, gains, &at.noise.covariance).filter(|_| inside);
             match trial.map(|trial| (now - trial.criterion(self.spectra), trial)) {
                 Some((gain, trial)) if gain > 0.0 => Trial::Lower { point: trial, ratio: gain / promised },
                 _ => Trial::Rejected,

@@ -119,13 +119,7 @@ fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
 
 /// -2 log likelihood and noise of a point; noise at the inputs is white.
 pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
-    deviance_of(spectra, point, (noise_order, false))
-}
-
-/// The same with noise at the inputs that may have a colour where up to seven outputs see it together.
-fn deviance_of(spectra: &Spectra, point: &Point, noise: (usize, bool)) -> (f64, Noise) {
-    let residuals = point.residuals(spectra);
-    let noise = Noise::fit(spectra, &residuals, noise, &point.model);
+    let noise = Noise::fit(spectra, &point.residuals(spectra), (noise_order, false), &point.model);
     (of_noise(spectra, &noise, &point.model), noise)
 }
 
@@ -186,11 +180,16 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
 
 /// What a search makes small, and the noise of the point.
 fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
-    // Autoregressions of single outputs do not stand for the colour of what several see. That of one output does until the last search: with a
+    // Autoregressions of single outputs do not describe the colour of what several see. That of one output does until the last search: with a
     // colour, searches from long regressions of a two-tank level end 60 to 100 nats above the model that they find without it.
     let coloured = options.filter_moves || spectra.outputs > 1;
-    let (value, noise) = deviance_of(spectra, point, (options.noise_order, coloured));
-    (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
+    let noise = Noise::fit(spectra, &point.residuals(spectra), (options.noise_order, coloured), &point.model);
+    (value_of(spectra, &noise, &point.model, options), noise)
+}
+
+/// -2 log likelihood of y given the excitation.
+fn value_of(spectra: &Spectra, noise: &Noise, model: &Model, options: &SearchOptions) -> f64 {
+    of_noise(spectra, noise, model) - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(model, &options.direct)
 }
 
 /// The same on lines as they are.

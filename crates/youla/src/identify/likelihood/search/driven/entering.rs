@@ -18,7 +18,7 @@
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.2 and 10.3, in the form of a filter that depends on the plant.
 
 use super::gains::hidden;
-use super::kalman::{System, diagonal};
+use super::kalman::{System, diagonal, places_of};
 use super::{Kalman, longest};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
@@ -125,14 +125,12 @@ impl Entering {
         }
         let kalman = Kalman::new(model, &hidden, (0..model.outputs, entry))?.0;
         let (m, n, p) = (model.inputs, model.order(), model.outputs);
-        let of_block = |k: usize| std::iter::repeat_n(!hidden.contains(&k), model.blocks[k].states);
-        let seen: Vec<bool> = (0..model.blocks.len()).flat_map(of_block).collect();
         // Of the states of the filter their places among those of the plant, behind which are those of the colours.
-        let mut places: Vec<usize> = (0..n).filter(|i| seen[*i]).collect();
-        let of_plant = places.len();
-        places.extend((0..kalman.of_colour.nrows()).map(|j| n + j));
-        let known = |i: usize, o: usize| if i < n { kalman.gain[(i, o)] } else { kalman.of_colour[(i - n, o)] };
-        let gain = Mat::from_fn(places.len(), p, |i, o| known(places[i], o));
+        let gains = kalman.gains();
+        let places = places_of(model, &hidden, gains.nrows());
+        let of_plant = places.len() - kalman.of_colour.nrows();
+        let seen = (0..n).map(|state| places.contains(&state)).collect();
+        let gain = Mat::from_fn(places.len(), p, |i, o| gains[(places[i], o)]);
         let system = System::new(&model.without(&hidden), 0..p, kalman.entry.colour);
         let filter = Filter::new(system, &kalman, gain)?;
         let put = |to: &mut [Mat<f64>], column: usize, change: &Change| {

@@ -111,54 +111,53 @@ impl Kalman {
         let dual = RiccatiProblem { a: a.transpose(), b: c.transpose(), q: q.as_ref(), r: sensors.as_ref(), s: None };
         let solution = dare("the noise", &dual).ok()?;
         let k = solution.gain.transpose().to_owned();
-        let mut gain = Mat::zeros(model.order(), outputs.len());
-        let (_, mut b, _) = model.matrices();
-        let (mut states, mut at) = (0..0, 0);
-        for (place, block) in model.blocks.iter().enumerate() {
-            states = states.end..states.end + block.states;
-            if hidden.contains(&place) {
-                b.subrows_mut(states.start, block.states).fill(0.0);
-            } else {
-                gain.subrows_mut(states.start, block.states).copy_from(k.subrows(at, block.states));
-                at += block.states;
-            }
-        }
-        let of_colour = k.subrows(at, k.nrows() - at).to_owned();
-        let unstable = plant.poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
         let closed = &a - &k * &c;
         let size = &c * &solution.x * c.transpose() + sensors;
-        Some((Kalman { entry, gain, b, of_colour, covariance: solution.x, size, unstable }, closed))
+        Some((Kalman::placed(model, hidden, &k, (entry, solution.x, size)), closed))
     }
-}
 
-impl Kalman {
     /// Of gains that are free but for the states of hidden blocks, those of the model, then those of the colours with their pole, and about the
     /// covariance of the innovations. Gains that leave `A - K C` unstable are replaced by those of the same spectrum, by the Riccati equation of
     /// `K epsilon`; `None` where it has no solution.
     pub(super) fn of_gain(
         model: &Model,
         hidden: &[usize],
-        (mut gain, colour): (Mat<f64>, Option<f64>),
+        (gain, colour): (Mat<f64>, Option<f64>),
         size: &Mat<f64>,
     ) -> Option<Self> {
-        let (n, m, p) = (model.order(), model.inputs, gain.ncols());
-        let (plant, free) = (model.without(hidden), states_of(model, hidden));
-        let System { a, c, .. } = System::new(&plant, 0..p, colour);
-        let places: Vec<usize> = free.iter().copied().chain(n..gain.nrows()).collect();
-        let own = Mat::from_fn(places.len(), p, |i, o| gain[(places[i], o)]);
-        let zeros = eigenvalues("the noise", (&a - &own * &c).as_ref()).ok()?;
+        let p = gain.ncols();
+        let System { a, c, .. } = System::new(&model.without(hidden), 0..p, colour);
+        let places = places_of(model, hidden, gain.nrows());
+        let mut k = Mat::from_fn(places.len(), p, |i, o| gain[(places[i], o)]);
+        let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
         if zeros.iter().any(|zero| zero.norm() >= 1.0) {
-            let (q, s) = (&own * size * own.transpose(), &own * size);
+            let (q, s) = (&k * size * k.transpose(), &k * size);
             let (a, b, s) = (a.transpose(), c.transpose(), Some(s.as_ref()));
             let dual = RiccatiProblem { a, b, q: q.as_ref(), r: size.as_ref(), s };
-            let own = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
-            places.iter().enumerate().for_each(|(i, place)| gain.row_mut(*place).copy_from(own.row(i)));
+            k = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
         }
-        let unstable = plant.poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
-        let entry = Entry { inputs: vec![1.0; m], sensors: vec![1.0; p], colour, free };
-        let (covariance, size, b) = (Mat::zeros(0, 0), size.clone(), model.matrices().1);
-        let of_colour = gain.subrows(n, gain.nrows() - n).to_owned();
-        Some(Kalman { entry, gain: gain.subrows(0, n).to_owned(), b, of_colour, covariance, size, unstable })
+        let free = states_of(model, hidden);
+        let entry = Entry { inputs: vec![1.0; model.inputs], sensors: vec![1.0; p], colour, free };
+        Some(Kalman::placed(model, hidden, &k, (entry, Mat::zeros(0, 0), size.clone())))
+    }
+
+    /// Of the gains of the states that are not hidden, then of the colours.
+    fn placed(
+        model: &Model,
+        hidden: &[usize],
+        k: &Mat<f64>,
+        (entry, covariance, size): (Entry, Mat<f64>, Mat<f64>),
+    ) -> Self {
+        let states = states_of(model, hidden);
+        let of_model = model.matrices().1;
+        let (mut gain, mut b) = (Mat::zeros(model.order(), k.ncols()), Mat::zeros(model.order(), model.inputs));
+        for (i, state) in states.iter().enumerate() {
+            gain.row_mut(*state).copy_from(k.row(i));
+            b.row_mut(*state).copy_from(of_model.row(*state));
+        }
+        let of_colour = k.subrows(states.len(), k.nrows() - states.len()).to_owned();
+        let unstable = model.without(hidden).poles().iter().map(|p: &c64| p.norm().max(1.0)).product();
+        Kalman { entry, gain, b, of_colour, covariance, size, unstable }
     }
 
     /// The gains of the states of the model, then those of the colours.
@@ -185,4 +184,9 @@ pub(crate) fn states_of(model: &Model, hidden: &[usize]) -> Vec<usize> {
         if hidden.contains(&k) { 0..0 } else { states }
     };
     (0..model.blocks.len()).flat_map(&mut of_block).collect()
+}
+
+/// The same, and the rows behind those of the states.
+pub(crate) fn places_of(model: &Model, hidden: &[usize], rows: usize) -> Vec<usize> {
+    states_of(model, hidden).into_iter().chain(model.order()..rows).collect()
 }

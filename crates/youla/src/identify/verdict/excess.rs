@@ -3,6 +3,7 @@
 use super::limits::{BAND_RATIO, LEAST_BANDS};
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
+use std::ops::Range;
 
 /// Unit of a band over that at the frequency in question, below which the band says nothing: half an octave of a double integrator.
 const LEAST_UNIT: f64 = 0.5;
@@ -76,20 +77,22 @@ impl Excess {
             largest = largest.max(deviations);
             square * if deviations > self.least { excess.max(0.0) } else { 0.0 }
         };
-        (self.means(share, squares).map(of).collect(), largest)
+        (self.means(share, squares(share), |band| self.bands[band].units(squares)).map(of).collect(), largest)
     }
 
     /// Mean square of each entry near a frequency with what chance explains of it, in units of which `squares` gives the squares: what the error
     /// may be where the bands are all that is known of it.
     pub(crate) fn with_chance(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> Vec<f64> {
-        self.means(share, squares).map(|(square, mean)| square * (mean.excess.max(0.0) + mean.chance)).collect()
+        let of = |(square, mean): (f64, Mean)| square * (mean.excess.max(0.0) + mean.chance);
+        self.means(share, squares(share), |band| self.bands[band].units(squares)).map(of).collect()
     }
 
     /// Whether the bands show an error of each entry of more than its unit at any frequency, by so many deviations.
     pub(crate) fn exceeds(&self, squares: &dyn Fn(f64) -> Vec<f64>, deviations: f64) -> Vec<bool> {
         let mut out = vec![false; self.bands.first().map_or(0, |band| band.squares.len())];
+        let units: Vec<Vec<f64>> = self.bands.iter().map(|band| band.units(squares)).collect();
         for band in &self.bands {
-            let means = self.means(band.share, squares);
+            let means = self.means(band.share, squares(band.share), |near| units[near].clone());
             out.iter_mut()
                 .zip(means)
                 .for_each(|(o, (_, mean))| *o |= mean.excess > 1.0 && mean.deviations > deviations);
@@ -97,17 +100,22 @@ impl Excess {
         out
     }
 
-    /// The square of the unit of each entry at a frequency with the means of its bands in that unit.
-    fn means(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> impl Iterator<Item = (f64, Mean)> {
-        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).iter().map(|b| (b, b.units(squares))).collect();
-        squares(share).into_iter().enumerate().map(move |(i, square)| {
+    /// The square of the unit of each entry at a frequency with the means of its bands in that unit, given those of a band.
+    fn means(
+        &self,
+        share: f64,
+        squares: Vec<f64>,
+        units: impl Fn(usize) -> Vec<f64>,
+    ) -> impl Iterator<Item = (f64, Mean)> {
+        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).map(|k| (&self.bands[k], units(k))).collect();
+        squares.into_iter().enumerate().map(move |(i, square)| {
             let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * square);
             (square, beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY)))))
         })
     }
 
     /// The bands around a frequency; none where the nearest is farther away than the window is wide.
-    fn window(&self, share: f64) -> &[ExcessBand] {
+    fn window(&self, share: f64) -> Range<usize> {
         let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
         let mut first = self.bands.partition_point(|b| b.share < from);
         let mut end = self.bands.partition_point(|b| b.share <= to);
@@ -115,7 +123,7 @@ impl Excess {
             first = first.saturating_sub(1);
             end = (end + 1).min(self.bands.len());
         }
-        &self.bands[first..end]
+        first..end
     }
 }
 

@@ -31,8 +31,6 @@ use rayon::prelude::*;
 const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
 /// Frequencies of the grid over which a difference is averaged, a fifth of an octave on each side: a resonance that moved is wider.
 const WINDOW: usize = 5;
-/// Lines on which the models of parts are searched: their difference is asked for to a tenth.
-const COMPARED: usize = 10000;
 /// Steps of a search on a part.
 const STEPS: usize = 15;
 
@@ -256,10 +254,6 @@ fn differences(
     let chart = Chart::new(model, found.feedthrough);
     let ((sa, ra), (sb, rb)) = (a.step(&chart, model), b.step(&chart, model));
     let models = searched.then(|| records.map(|records| on(problem, solution, records)));
-    let every = match &models {
-        Some([Some(a), Some(b)]) => [a.1, b.1],
-        _ => [1.0; 2],
-    };
     let apart = chart.change(model, &sa.iter().zip(&sb).map(|(a, b)| a - b).collect::<Vec<_>>());
     let (p, m) = (problem.outputs(), problem.inputs());
     let matrix = |g: &[c64]| Mat::from_fn(p, m, |i, j| g[i * m + j]);
@@ -269,12 +263,12 @@ fn differences(
             let (own, shared) = root.seen(&chart, model, z);
             own.iter().map(Mat::squared_norm_l2).sum::<f64>() + shared.squared_norm_l2()
         };
-        let variance = every[0] * of(&ra) + every[1] * of(&rb);
+        let variance = of(&ra) + of(&rb);
         let g = model.response(z);
         let norm = |g: &[c64]| g.iter().map(|g| g.norm_sqr()).sum::<f64>().sqrt();
         let (apart, size) = match &models {
             Some([Some(a), Some(b)]) => {
-                let (a, b) = (a.0.response(z), b.0.response(z));
+                let (a, b) = (a.response(z), b.response(z));
                 (a.iter().zip(&b).map(|(a, b)| a - b).collect(), norm(&a).hypot(norm(&b)) / 2.0_f64.sqrt())
             }
             _ => (model.response_change(&apart, z), norm(&g)),
@@ -285,16 +279,15 @@ fn differences(
     grid(solution.samples).into_par_iter().filter_map(at).collect()
 }
 
-/// The model of some records, from that of all, and of how many lines it sees one.
-fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<(Model, f64)> {
+/// The model of some records, from that of all, on groups of their lines where they are many.
+fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<Model> {
     let choice = &solution.chosen;
-    let spectra = problem.spectra_of(records, &choice.delays);
-    let every = (spectra.samples() / 2).div_ceil(COMPARED);
-    let spectra = spectra.thinned(every);
-    let start = with_best_ends(&spectra, choice.found.point.model.clone(), &choice.found.noise);
+    let lines = problem.spectra_of(records, &choice.delays);
+    let start = with_best_ends(&lines, choice.found.point.model.clone(), &choice.found.noise);
+    let spectra = grouped(&lines, &start, DAMPED).unwrap_or(lines);
     let problem = problem.with_feedthrough(choice.found.feedthrough);
     let options = problem.options(STEPS, 1.0, &choice.delays);
     let of_gain = with_gain_of(&choice.found, &spectra, &start, &options);
     let found = of_gain.or_else(|| search(&spectra, start, &options))?;
-    Some((found.point.model, every as f64))
+    Some(found.point.model)
 }

@@ -19,8 +19,10 @@ pub(crate) const NOISE_ORDER: usize = 40;
 
 /// Samples of all records above which order and dead time are first chosen on a part of them.
 pub(crate) const LONG: usize = 30000;
-/// Tasks on them that go on from groups of lines to all lines.
+/// Tasks on them that count, and distance of the criterion on groups of lines to the aim up to which the best is searched on all lines: twice that
+/// of rivals. All lines gain a few nats on groups.
 const KEPT: usize = 2;
+const NEAR: f64 = 24.0;
 
 /// More than any criterion of a record that fits into memory.
 const UNSTABLE: f64 = 1e12;
@@ -160,7 +162,8 @@ impl Problem<'_> {
             aim,
             direct,
             radius,
-            filter_moves: self.filter_moves,
+            // Searches on long records begin at the model of their first part.
+            filter_moves: self.filter_moves || self.samples().0 > LONG,
         }
     }
 
@@ -217,45 +220,54 @@ impl Problem<'_> {
         self.with_penalty(Choice { found, delays, criterion, origin })
     }
 
-    /// Of many tasks on long records those that reach the least criteria on groups of lines, with what they reach as start.
-    fn promising_tasks(&self, tasks: Vec<Task>) -> Vec<Task> {
-        let samples = self.samples().0;
-        if tasks.len() <= KEPT || samples <= LONG {
-            return tasks;
-        }
-        let reached = |mut task: Task| {
-            let (spectra, options) = (&task.spectra, self.options(25, 0.3, &task.delays));
-            let found = on_groups(spectra, &task.start, &options);
-            let found = found.or_else(|| search(spectra, task.start.clone(), &options))?;
-            let criterion = found.criterion(samples);
-            let reached = Choice { found, delays: task.delays.clone(), criterion, origin: String::new() };
-            let criterion = criterion + self.instability(&reached);
-            task.start = reached.found.point;
-            Some((criterion, task))
-        };
-        let found: Vec<Option<(f64, Task)>> = tasks.into_par_iter().map(reached).collect();
-        let mut found: Vec<(f64, Task)> = found.into_iter().flatten().collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found.truncate(KEPT);
-        found.into_iter().map(|(_, task)| task).collect()
-    }
-
     /// Searches all tasks side by side and notes them in their order.
     pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
+        // What begins a search is always tried.
         let searched = |task: Task| {
-            // What begins a search is always tried.
+            if aim.is_finite() && self.out_of_time() { None } else { self.searched(task, aim) }
+        };
+        let found: Vec<Choice> = if self.samples().0 > LONG {
+            self.searched_on_groups(tasks, aim)
+        } else {
+            let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
+            found.into_iter().flatten().collect()
+        };
+        table.extend(found.iter().map(|choice| self.noted(choice)));
+        found
+    }
+
+    /// Where a search on all lines ends.
+    fn searched(&self, task: Task, aim: f64) -> Option<Choice> {
+        let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
+        let found = search(&task.spectra, task.start, &options)?;
+        Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
+    }
+
+    /// Of tasks on long records those that reach the least criteria on groups of lines, searched on all lines where they come near the aim.
+    fn searched_on_groups(&self, tasks: Vec<Task>, aim: f64) -> Vec<Choice> {
+        let reached = |task: Task| {
             if aim.is_finite() && self.out_of_time() {
                 return None;
             }
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
-            let found = search(&task.spectra, task.start, &options)?;
-            Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
+            let Some(found) = on_groups(&task.spectra, &task.start, &options) else {
+                return Some((self.searched(task, aim)?, None));
+            };
+            let choice = self.choice(found, task.spectra.samples(), task.delays, task.origin);
+            Some((choice, Some(task.spectra)))
         };
-        let tasks = self.promising_tasks(tasks);
-        let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
-        let found: Vec<Choice> = found.into_iter().flatten().collect();
-        table.extend(found.iter().map(|choice| self.noted(choice)));
-        found
+        let found: Vec<Option<(Choice, Option<Arc<Spectra>>)>> = tasks.into_par_iter().map(reached).collect();
+        let mut found: Vec<(Choice, Option<Arc<Spectra>>)> = found.into_iter().flatten().collect();
+        found.sort_by(|a, b| a.0.criterion.total_cmp(&b.0.criterion));
+        found.truncate(KEPT);
+        // All lines decide of the best alone.
+        if let Some((best, spectra)) = found.first_mut().filter(|(choice, _)| choice.criterion < aim + NEAR)
+            && let Some(spectra) = spectra.take()
+        {
+            let Choice { found, delays, origin, .. } = best.clone();
+            *best = self.searched(Task { spectra, start: found.point, delays, origin }, aim).unwrap_or(best.clone());
+        }
+        found.into_iter().map(|(choice, _)| choice).collect()
     }
 
     /// Whether nothing better is tried any more.

@@ -64,24 +64,23 @@ impl Problem<'_> {
             return self.solve_wide_from(tried, table);
         }
         let samples = self.samples().0;
-        let rounds = if samples > LONG { 1 } else { ROUNDS };
         let now = best(&tried)?.found.feedthrough;
         let here = self.with_feedthrough(now);
-        let mut at = here.improved(&mut tried, rounds, table)?;
+        let mut at = here.improved(&mut tried, table)?;
         if self.stops_at(&at) {
             return Some(Solution { chosen: at, rivals: Vec::new(), samples });
         }
         let here = here.with_moving_filter(&mut tried, &mut at, table)?;
-        here.walk_through_unstable(&mut tried, &at, rounds, table);
+        here.walk_through_unstable(&mut tried, &at, table);
         here.integrating(&mut tried, &at, table);
         if best(&tried)?.criterion < at.criterion {
-            at = here.improved(&mut tried, rounds, table)?;
+            at = here.improved(&mut tried, table)?;
         }
         let tasks = here.apart(&at);
         let credit = tasks.iter().map(|task| credit_of_lags(&task.start.model, samples)).fold(0.0, f64::max);
         tried.extend(here.run(tasks, at.as_rival(samples) + BESIDE + credit, table));
         if best(&tried)?.criterion < at.criterion {
-            at = here.improved(&mut tried, rounds, table)?;
+            at = here.improved(&mut tried, table)?;
         }
         if self.direct.is_some() && !now {
             let wider = here.with_feedthrough(true);
@@ -91,14 +90,14 @@ impl Problem<'_> {
             let tasks = std::iter::once(&at).chain(at_once).map(|c| wider.same(c)).collect();
             tried.extend(wider.run(tasks, at.criterion, table));
             if best(&tried)?.criterion < at.criterion - INDISTINCT {
-                at = wider.improved(&mut tried, rounds, table)?;
+                at = wider.improved(&mut tried, table)?;
             }
         }
         if samples <= LONG {
             let last = here.with_feedthrough(at.found.feedthrough);
             last.smaller_along_delays(&mut tried, &at, table);
             if best(&tried)?.criterion < at.criterion {
-                at = last.improved(&mut tried, rounds, table)?;
+                at = last.improved(&mut tried, table)?;
             }
             last.along_delays(&mut tried, &at, table);
         }
@@ -151,16 +150,14 @@ impl Problem<'_> {
     /// With a filter that moves in every search, where that of the noise at the input of one output leads to a better model: from long regressions
     /// searches end at worse models with it for some records, without it for others.
     fn with_moving_filter(self, tried: &mut Vec<Choice>, at: &mut Choice, table: &mut Vec<Candidate>) -> Option<Self> {
-        if self.outputs() > 1 || at.found.noise.parameters() <= FEW {
+        if self.outputs() > 1 || self.samples().0 > LONG || at.found.noise.parameters() <= FEW {
             return Some(self);
         }
-        let (moving, long) = (Problem { filter_moves: true, ..self.clone() }, self.samples().0 > LONG);
+        let moving = Problem { filter_moves: true, ..self.clone() };
         let same = Task { origin: "the same with a filter that moves".into(), ..moving.same(at) };
         let mut found = moving.run(vec![same], f64::INFINITY, table);
-        if !long {
-            found.extend(moving.regressed(table));
-        }
-        let better = moving.improved(&mut found, if long { 1 } else { ROUNDS }, table)?;
+        found.extend(moving.regressed(table));
+        let better = moving.improved(&mut found, table)?;
         if moving.with_free_noise(&better) >= self.with_free_noise(at) - 0.5 {
             return Some(self);
         }
@@ -170,9 +167,9 @@ impl Problem<'_> {
     }
 
     /// Models one step away as long as the criterion falls.
-    fn improved(&self, tried: &mut Vec<Choice>, rounds: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
+    fn improved(&self, tried: &mut Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Choice> {
         let mut at = best(tried)?.clone();
-        for _ in 0..rounds {
+        for _ in 0..ROUNDS {
             if self.out_of_time() || self.stops_at(&at) {
                 break;
             }
@@ -188,14 +185,14 @@ impl Problem<'_> {
 
     /// Goes on from a model that the feedback does not stabilise where it explains distinctly more than the best that it does: of a machine with
     /// more slow modes than the model, the next mode alone often makes the loop unstable, and the one after it makes it stable again.
-    fn walk_through_unstable(&self, tried: &mut Vec<Choice>, at: &Choice, rounds: usize, table: &mut Vec<Candidate>) {
+    fn walk_through_unstable(&self, tried: &mut Vec<Choice>, at: &Choice, table: &mut Vec<Candidate>) {
         // A growing mode that the feedback does not move is a disturbance whose size changes.
         let moved = |c: &&Choice| self.unstable_poles(c).iter().all(|(z, apart)| *apart > MOVED * z.norm().ln());
         let unstable: Vec<Choice> =
             tried.iter().filter(|c| !c.stabilised()).filter(moved).map(Choice::without_penalty).collect();
         let Some(start) = best(&unstable).filter(|c| c.criterion < at.criterion - INDISTINCT) else { return };
         let (mut walked, free) = (vec![start.clone()], Problem { feedback: None, ..self.clone() });
-        free.improved(&mut walked, rounds, &mut Vec::new());
+        free.improved(&mut walked, &mut Vec::new());
         let walked = walked.into_iter().skip(1).map(|choice| self.with_penalty(choice));
         let first = tried.len();
         tried.extend(walked);

@@ -14,7 +14,7 @@ use super::point::Point;
 use super::residual::residual;
 use super::rows::{Place, Rows};
 use crate::identify::likelihood::data::lanes::LANES;
-use crate::identify::likelihood::data::spectra::{Spectra, parts};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use crate::linalg::TINY;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, Par, c64};
@@ -99,13 +99,11 @@ fn linearise_all(
     let of_noise = if coefficients { noise.parameters() } else { 0 };
     let n = point.model.end_count();
     let width = chart.parameters() + of_noise + extra.count + 1;
-    let mut factor = Mat::<f64>::zeros(0, width);
-    let mut ends = Vec::with_capacity(spectra.records.len());
     let entering = match extra.filter {
         Filter::Held => None,
         Filter::Moves | Filter::Free => Entering::new(spectra, &point.model, chart, noise),
     };
-    for (k, (lines, t)) in spectra.records.iter().zip(&point.ends).enumerate() {
+    let of_record = |(k, (lines, t)): (usize, (&Lines, &Vec<f64>))| {
         let values = extra.values.get(k).map_or(&[][..], Vec::as_slice);
         // Slopes are those beside what the ends of colours drive.
         let joint = noise.joint.as_ref().filter(|joint| entering.is_some() && joint.ends() > 0);
@@ -123,11 +121,14 @@ fn linearise_all(
             more: (values, extra.count),
         };
         let r = triangle(place, extra.quick);
-        ends.push(r.submatrix(0, 0, n.min(r.nrows()), n + width).to_owned());
         let below = r.nrows().saturating_sub(n);
-        let rest = r.submatrix(n.min(r.nrows()), n, below, width);
-        factor = if factor.nrows() == 0 { rest.to_owned() } else { compressed(&stacked(&factor, &rest.to_owned())) };
-    }
+        let ends = r.submatrix(0, 0, n.min(r.nrows()), n + width).to_owned();
+        (ends, r.submatrix(n.min(r.nrows()), n, below, width).to_owned())
+    };
+    let (ends, triangles): (Vec<Mat<f64>>, Vec<Mat<f64>>) =
+        spectra.records.par_iter().zip(&point.ends).enumerate().map(of_record).unzip();
+    let joined = |a: Mat<f64>, b: Mat<f64>| if a.nrows() == 0 { b } else { compressed(&stacked(&a, &b)) };
+    let factor = triangles.into_iter().fold(Mat::zeros(0, width), joined);
     (Linearised { factor, ends }, chart.parameters()..chart.parameters() + of_noise)
 }
 

@@ -149,8 +149,9 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
     Some(Found { steps: near.steps + found.steps, given_up: near.given_up || found.given_up, ..found })
 }
 
-/// The same on groups of lines alone, which are made anew while the search moves; `None` also where there are no groups, and where all lines do
-/// not gain what groups promise: beside large and slow motion a small change of the model leaves more than the noise.
+/// The same on groups of lines alone, which are made anew while the search moves, with deviance and noise of all lines; `None` also where there
+/// are no groups, and where all lines do not gain what groups promise: beside large and slow motion a small change of the model leaves more than
+/// the noise.
 pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<Found> {
     let (mut reached, mut steps): (Option<Found>, usize) = (None, 0);
     let mut before = f64::INFINITY;
@@ -163,14 +164,14 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
         let options = SearchOptions { steps: options.steps - steps, ..options.clone() };
         let promised = cost(&groups, point, &options).0;
         let found = on_lines(&groups, point.clone(), &options)?;
-        let after = cost(spectra, &found.point, &options).0;
+        let (after, noise) = cost(spectra, &found.point, &options);
         if (before - after).is_nan() || before - after < KEPT * (promised - found.deviance) - options.tolerance {
             break;
         }
         before = after;
         let (moved, given_up) = (found.steps, found.given_up);
         steps += moved;
-        reached = Some(Found { steps, ..found });
+        reached = Some(Found { steps, deviance: after, noise, ..found });
         if moved < REGROUPED || given_up {
             break;
         }
@@ -243,7 +244,7 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         }
     }
     // The gain of noise at the inputs belongs to the coordinates of its model, which are others after `reblocked`.
-    if noise.enters_at_inputs() {
+    if steps > 0 && noise.enters_at_inputs() {
         noise = cost(spectra, &point, options).1;
     }
     Some(Found { point, noise, deviance: least, parameters, steps, given_up, feedthrough: options.feedthrough })

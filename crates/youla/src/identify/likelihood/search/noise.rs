@@ -151,11 +151,13 @@ impl Noise {
         let p = spectra.outputs;
         let mut noise = Noise { regression, joint, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
-        for (k, lines) in spectra.records.iter().enumerate() {
+        let of_record = |(k, lines): (usize, &Lines)| {
             let rest: Vec<&[c64]> = rest.iter().map(|rest| rest[k].as_slice()).collect();
             let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, rest: &rest, range });
-            parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
-        }
+            parts(lines.z.len()).map(of).collect::<Vec<_>>()
+        };
+        let products: Vec<Vec<Mat<f64>>> = spectra.records.par_iter().enumerate().map(of_record).collect();
+        products.iter().flatten().for_each(|part| sum += part);
         let samples = spectra.samples().max(1) as f64;
         for i in 0..p {
             for j in 0..=i {

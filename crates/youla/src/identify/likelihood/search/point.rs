@@ -5,6 +5,7 @@ use super::noise::Noise;
 use super::residual::residual;
 use crate::identify::likelihood::data::spectra::Spectra;
 use faer::c64;
+use rayon::prelude::*;
 
 /// A model and the vectors t of the records.
 #[derive(Debug, Clone)]
@@ -24,7 +25,7 @@ impl Point {
 
     /// Residuals `Y - G U - ...`, lines x p for each record.
     pub(crate) fn residuals(&self, spectra: &Spectra) -> Vec<Vec<c64>> {
-        spectra.records.iter().zip(&self.ends).map(|(lines, t)| residual(&self.model, lines, t)).collect()
+        spectra.records.par_iter().zip(&self.ends).map(|(lines, t)| residual(&self.model, lines, t)).collect()
     }
 }
 

@@ -109,6 +109,10 @@ impl Joint {
                 }
             }
         }
+        if p == 1 {
+            whitener[0] = h[0].inverse();
+            return;
+        }
         if p == 2 {
             // The adjugate over the determinant.
             let mut scale = h[0].times(&h[3]);
@@ -127,7 +131,7 @@ impl Joint {
 
     /// The residuals, lines x p, behind `1 / H`, without what the ends of the colours drive.
     pub(crate) fn rest(&self, spectra: &Spectra, residuals: &[Vec<c64>]) -> Vec<Vec<c64>> {
-        spectra.records.iter().zip(residuals).map(|(lines, v)| self.rest_and_ends(lines, v).0).collect()
+        spectra.records.par_iter().zip(residuals).map(|(lines, v)| self.rest_and_ends(lines, v).0).collect()
     }
 
     /// The same of one record, and t_w.
@@ -254,9 +258,9 @@ impl NullaryFnOnce for Rest<'_> {
             (0..=m).for_each(|column| filters.apply(&mut values[column..], 1 + m, &mut own));
             for l in 0..LANES.min(range.end - first) {
                 for values in values.chunks(1 + m) {
-                    let mut of = values.iter().map(|v| c64::new(v.re[l], v.im[l]));
-                    out[0].extend(of.next());
-                    out[1].extend(of);
+                    let of = |v: &Lanes| c64::new(v.re[l], v.im[l]);
+                    out[0].push(of(&values[0]));
+                    out[1].extend(values[1..].iter().map(of));
                 }
             }
         }

@@ -74,6 +74,9 @@ const LEAST_DRIFT: f64 = 1e-3;
 const STEPS_TO_AIM: [f64; 2] = [40.0, 20.0];
 /// Damping ratio of the modes that the groups of a search leave room for beside those of its start.
 pub(crate) const DAMPED: f64 = 0.4;
+/// Decrease that a search with the filter of the noise held promises without any step that lowers the deviance, from which the filter moves.
+/// Chosen: odds of e^4 to one.
+const MISLED: f64 = 8.0;
 /// Steps on groups from which they are made anew: a start that moves less is near enough to them.
 const REGROUPED: usize = 2;
 /// Share of the gain that groups promise which all lines must show. Chosen: within it the slopes of groups are those of lines.
@@ -207,8 +210,10 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         let slope = slope(spectra, &point, (&chart, &noise), (options, moves));
         let filter = if moves { Filter::Free } else { Filter::Held };
         let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope, filter);
+        let mut first_promise = None;
         let lower = damping.descend(|damping| {
             let (trial, promised) = slopes.trial(&point, damping);
+            first_promise.get_or_insert(promised);
             // A promise that is not a number ends the search as well.
             if promised.is_nan() || promised <= options.tolerance {
                 return Trial::Negligible;
@@ -229,8 +234,9 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         if gain < options.tolerance {
             // A mode that is a line of the noise is first taken out of the outputs, at the frequency that it has here.
             let last = || filter_moves || !noise.enters_at_inputs() || has_line(&point.model, spectra);
-            // Held, the filter of several outputs draws the plant too far for models to be compared.
-            let moves = options.filter_moves || (noise.joint.is_some() && spectra.outputs > 1);
+            // Held, the filter of several outputs draws the plant too far for models to be compared, and that of one may promise what no step keeps.
+            let misled = spectra.outputs > 1 || first_promise.is_some_and(|promised| promised > MISLED);
+            let moves = options.filter_moves || (noise.joint.is_some() && misled);
             if !moves || last() {
                 break;
             }

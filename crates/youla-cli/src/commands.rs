@@ -78,7 +78,7 @@ fn identify_and_write(
     let written = write_into(&found, place, &mut clock)?;
     progress.clear();
     form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))?;
-    found.pid_reservation().map_or(Ok(()), |why| Err(Failure::Refused(why, youla::ErrorKind::Numerical)))
+    found.redesign_reservation().map_or(Ok(()), |why| Err(Failure::Refused(why, youla::ErrorKind::Numerical)))
 }
 
 fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {

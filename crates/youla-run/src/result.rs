@@ -165,14 +165,17 @@ impl Identification {
         found(self.pid.as_ref())
     }
 
-    /// Why the new PID that was asked for is not there or should not be taken.
-    pub fn pid_reservation(&self) -> Option<String> {
-        let asked = self.settings.redesign.as_ref().is_some_and(|r| r.structure.is_some());
-        match self.pid.as_ref() {
-            None => asked.then(|| "[redesign] structure needs the recommended model, which this run lacks".to_owned()),
-            Some(Err(error)) => Some(error.to_string()),
-            Some(Ok(new)) => Some(new.reservations().join("; ")).filter(|reasons| !reasons.is_empty()),
-        }
+    /// Why the new controller that was asked for is not there or should not be taken.
+    pub fn redesign_reservation(&self) -> Option<String> {
+        let asked = self.settings.redesign.as_ref()?;
+        let reasons = match (&self.pid, &self.redesign, asked.structure) {
+            (Some(Err(error)), ..) | (_, Some(Err(error)), None) => error.to_string(),
+            (Some(Ok(new)), ..) => new.reservations().join("; "),
+            (_, Some(Ok(_)), None) => String::new(),
+            (None, _, Some(_)) => "[redesign] structure needs the recommended model, which this run lacks".into(),
+            (_, None, None) => "[redesign] needs the recommended model and coprime factors, which this run lacks".into(),
+        };
+        Some(reasons).filter(|reasons| !reasons.is_empty())
     }
 
     /// The uncertainty of a model beside the recommended one.

@@ -178,6 +178,15 @@ fn what_is_not_met_is_written_and_ends_with_3() {
     assert!(folder.join("run/summary.json").is_file());
 }
 
+/// A peak of the sensitivity of 1.001 allows no feedback.
+#[test]
+fn an_lqg_that_no_weight_gives_ends_with_3_behind_its_results() {
+    let (folder, code, stderr) = run("lqg-not-met", 0.98, "[redesign]\npeak_sensitivity = 1.001\n");
+    assert!(code == Some(3) && stderr.contains("no weight gives a new controller"), "{code:?} {stderr}");
+    let refused = &json(&folder.join("run/summary.json"))["refused"];
+    assert!(refused["redesign"].as_str().is_some_and(|why| why.contains("peak of the sensitivity")), "{refused}");
+}
+
 #[test]
 fn what_no_run_can_do_is_refused_before_it() {
     for (name, redesign, key) in [

@@ -148,9 +148,10 @@ impl Problem<'_> {
     }
 
     /// With a filter that moves in every search, where that of the noise at the input of one output leads to a better model: from long regressions
-    /// searches end at worse models with it for some records, without it for others.
+    /// searches end at worse models with it for some records, without it for others. Where no noise enters at the inputs, no filter moves.
     fn with_moving_filter(self, tried: &mut Vec<Choice>, at: &mut Choice, table: &mut Vec<Candidate>) -> Option<Self> {
-        if self.outputs() > 1 || self.samples().0 > LONG || at.found.noise.parameters() <= FEW {
+        let noise = &at.found.noise;
+        if self.outputs() > 1 || self.samples().0 > LONG || noise.joint.is_none() || noise.parameters() <= FEW {
             return Some(self);
         }
         let moving = Problem { filter_moves: true, ..self.clone() };

@@ -173,7 +173,9 @@ impl Identification {
             (Some(Ok(new)), ..) => new.reservations().join("; "),
             (_, Some(Ok(_)), None) => String::new(),
             (None, _, Some(_)) => "[redesign] structure needs the recommended model, which this run lacks".into(),
-            (_, None, None) => "[redesign] needs the recommended model and coprime factors, which this run lacks".into(),
+            (_, None, None) => {
+                "[redesign] needs the recommended model and coprime factors, which this run lacks".into()
+            }
         };
         Some(reasons).filter(|reasons| !reasons.is_empty())
     }

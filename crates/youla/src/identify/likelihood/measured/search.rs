@@ -3,8 +3,8 @@
 use super::lines::{WeighedLine, WeighedLines};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::point::Point;
-use crate::identify::likelihood::search::{FIRST_DAMPING, damped, reblocked};
+use crate::identify::likelihood::search::point::{Point, reblocked};
+use crate::identify::likelihood::search::{FIRST_DAMPING, damped};
 use crate::linalg::{Damping, LEAST_DAMPING, Trial};
 use faer::{Mat, c64};
 use rayon::prelude::*;

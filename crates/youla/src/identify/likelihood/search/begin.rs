@@ -1,8 +1,8 @@
 //! Where a search begins: at the ends of the records that belong to its noise.
 
 use super::noise::Noise;
-use super::point::Point;
-use super::{SearchOptions, cost, reblocked, with_best_ends, with_best_inputs};
+use super::point::{Point, reblocked};
+use super::{SearchOptions, cost, with_best_ends, with_best_inputs};
 use crate::identify::likelihood::data::spectra::Spectra;
 
 /// Times that the ends of a start and the filter of its noise are taken from each other: the third changes little.

@@ -4,7 +4,7 @@ use super::model::Model;
 use super::noise::Noise;
 use super::residual::residual;
 use crate::identify::likelihood::data::spectra::Spectra;
-use faer::c64;
+use faer::{Mat, c64};
 use rayon::prelude::*;
 
 /// A model and the vectors t of the records.
@@ -27,6 +27,31 @@ impl Point {
     pub(crate) fn residuals(&self, spectra: &Spectra) -> Vec<Vec<c64>> {
         spectra.records.par_iter().zip(&self.ends).map(|(lines, t)| residual(&self.model, lines, t)).collect()
     }
+}
+
+/// Blocks formed anew, the ends of the records carried along as if they were inputs.
+pub(crate) fn reblocked(point: &Point) -> Option<Point> {
+    let (n, m, records) = (point.model.order(), point.model.inputs, point.ends.len());
+    let (a, b, c) = point.model.matrices();
+    let finite = |x: &Mat<f64>| x.col_iter().all(|col| col.iter().all(|v| v.is_finite()));
+    if !(finite(&a) && finite(&b) && finite(&c)) {
+        return None;
+    }
+    let wide = Mat::from_fn(n, m + records, |i, j| if j < m { b[(i, j)] } else { point.ends[j - m][i] });
+    let whole = Model::of(a.as_ref(), wide.as_ref(), c.as_ref(), Vec::new())?;
+    let mut ends = vec![Vec::with_capacity(point.model.end_count()); records];
+    let mut model = whole.clone();
+    model.inputs = m;
+    model.d = point.model.d.clone();
+    for (block, wide) in model.blocks.iter_mut().zip(&whole.blocks) {
+        let s = wide.states;
+        block.b = (0..s * m).map(|x| wide.b[(x / m) * (m + records) + x % m]).collect();
+        for (r, end) in ends.iter_mut().enumerate() {
+            end.extend((0..s).map(|i| wide.b[i * (m + records) + m + r]));
+        }
+    }
+    ends.iter_mut().zip(&point.ends).for_each(|(end, before)| end.extend_from_slice(&before[n..]));
+    Some(Point { model, ends })
 }
 
 /// Sum of squares of the whitened residuals.

@@ -162,8 +162,8 @@ impl Problem<'_> {
             aim,
             direct,
             radius,
-            // Searches on long records begin at the model of their first part.
-            filter_moves: self.filter_moves || self.samples().0 > LONG,
+            // Searches on long records of one output begin at the model of their first part; the filter of several moves anyway.
+            filter_moves: self.filter_moves || (self.outputs() == 1 && self.samples().0 > LONG),
         }
     }
 

@@ -31,6 +31,9 @@ const WRONG_DELAY: f64 = 60.0;
 const MOVED: f64 = 5.0;
 /// Coefficients of the noise up to which it is that of the outputs: a pole and a zero describe drift.
 const FEW: usize = 3;
+/// Decrease of the deviance that the last search leaves at most: a hundredth of a standard deviation along any direction, so that the last digits of
+/// a log do not show in the model.
+const CONVERGED: f64 = 1e-4;
 /// Differences of the criterion of rivals up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 
@@ -111,7 +114,7 @@ impl Problem<'_> {
         let mut chosen = tried[place].clone();
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
-        let options = SearchOptions { filter_moves: true, ..last.options(40, 0.01, &chosen.delays) };
+        let options = SearchOptions { filter_moves: true, ..last.options(40, CONVERGED, &chosen.delays) };
         if let Some(found) = search(&spectra, chosen.found.point.clone(), &options) {
             let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
             if last.stabilised() || !chosen.stabilised() {

@@ -77,14 +77,14 @@ impl Excess {
             largest = largest.max(deviations);
             square * if deviations > self.least { excess.max(0.0) } else { 0.0 }
         };
-        (self.means(share, squares(share), |band| self.bands[band].units(squares)).map(of).collect(), largest)
+        (self.means_at(share, squares).map(of).collect(), largest)
     }
 
     /// Mean square of each entry near a frequency with what chance explains of it, in units of which `squares` gives the squares: what the error
     /// may be where the bands are all that is known of it.
     pub(crate) fn with_chance(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> Vec<f64> {
         let of = |(square, mean): (f64, Mean)| square * (mean.excess.max(0.0) + mean.chance);
-        self.means(share, squares(share), |band| self.bands[band].units(squares)).map(of).collect()
+        self.means_at(share, squares).map(of).collect()
     }
 
     /// Whether the bands show an error of each entry of more than its unit at any frequency, by so many deviations.
@@ -100,7 +100,12 @@ impl Excess {
         out
     }
 
-    /// The square of the unit of each entry at a frequency with the means of its bands in that unit, given those of a band.
+    /// The square of the unit of each entry at a frequency with the means of its bands in that unit.
+    fn means_at(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> impl Iterator<Item = (f64, Mean)> {
+        self.means(share, squares(share), |band| self.bands[band].units(squares))
+    }
+
+    /// The same, given the squares of the units at the frequency and those of a band.
     fn means(
         &self,
         share: f64,

@@ -223,14 +223,10 @@ impl Problem<'_> {
     /// Searches all tasks side by side and notes them in their order.
     pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
         // What begins a search is always tried.
-        let searched = |task: Task| {
-            if aim.is_finite() && self.out_of_time() { None } else { self.searched(task, aim) }
-        };
-        let found: Vec<Choice> = if self.samples().0 > LONG {
-            self.searched_on_groups(tasks, aim)
-        } else {
-            let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
-            found.into_iter().flatten().collect()
+        let tasks = tasks.into_par_iter().filter(|_| !(aim.is_finite() && self.out_of_time()));
+        let found = match self.samples().0 > LONG {
+            true => self.searched_on_groups(tasks, aim),
+            false => tasks.filter_map(|task| self.searched(task, aim)).collect(),
         };
         table.extend(found.iter().map(|choice| self.noted(choice)));
         found
@@ -244,11 +240,8 @@ impl Problem<'_> {
     }
 
     /// Of tasks on long records those that reach the least criteria on groups of lines, searched on all lines where they come near the aim.
-    fn searched_on_groups(&self, tasks: Vec<Task>, aim: f64) -> Vec<Choice> {
+    fn searched_on_groups(&self, tasks: impl ParallelIterator<Item = Task>, aim: f64) -> Vec<Choice> {
         let reached = |task: Task| {
-            if aim.is_finite() && self.out_of_time() {
-                return None;
-            }
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
             let Some(found) = on_groups(&task.spectra, &task.start, &options) else {
                 return Some((self.searched(task, aim)?, None));
@@ -256,16 +249,16 @@ impl Problem<'_> {
             let choice = self.choice(found, task.spectra.samples(), task.delays, task.origin);
             Some((choice, Some(task.spectra)))
         };
-        let found: Vec<Option<(Choice, Option<Arc<Spectra>>)>> = tasks.into_par_iter().map(reached).collect();
-        let mut found: Vec<(Choice, Option<Arc<Spectra>>)> = found.into_iter().flatten().collect();
+        let mut found: Vec<(Choice, Option<Arc<Spectra>>)> = tasks.filter_map(reached).collect();
         found.sort_by(|a, b| a.0.criterion.total_cmp(&b.0.criterion));
         found.truncate(KEPT);
         // All lines decide of the best alone.
-        if let Some((best, spectra)) = found.first_mut().filter(|(choice, _)| choice.criterion < aim + NEAR)
-            && let Some(spectra) = spectra.take()
-        {
+        if let Some((best, Some(spectra))) = found.first_mut().filter(|(choice, _)| choice.criterion < aim + NEAR) {
             let Choice { found, delays, origin, .. } = best.clone();
-            *best = self.searched(Task { spectra, start: found.point, delays, origin }, aim).unwrap_or(best.clone());
+            let task = Task { spectra: spectra.clone(), start: found.point, delays, origin };
+            if let Some(last) = self.searched(task, aim) {
+                *best = last;
+            }
         }
         found.into_iter().map(|(choice, _)| choice).collect()
     }

@@ -25,6 +25,10 @@ const STARTS: usize = 6;
 /// Evaluations for each parameter, of the first and of each later round. With half as many the product of the gains of two loops was lower by 5 to 23 %
 /// in three of four loops.
 const STEPS: [usize; 2] = [440, 220];
+/// A search is repeated from its own result, with steps of the first size, while it gains so much: along an edge of two limits the steps become
+/// short before the best point. With three repeats one loop gained 0 to 10 % and two loops 50 %, with ten not 1 % more.
+const REPEATS: u64 = 4;
+const GAINED: f64 = 0.01;
 /// Cost of an excess of a limit, against the logarithm of the gain. The gain follows a limit by less than this: the penalty is exact.
 const PENALTY: f64 = 30.0;
 /// Excess of an unstable loop.
@@ -61,7 +65,16 @@ impl Search<'_> {
             let searched = starts.into_par_iter().enumerate().map(|(k, x)| {
                 let mut judges = self.judges(&active);
                 let mut cost = |x: &[f64], enough| self.cost(x, &mut judges, reserve, enough);
-                evolve(Point { cost: cost(&x, f64::INFINITY), x }, width, (steps, (round * STARTS + k) as u64), cost)
+                let mut best = Point { cost: cost(&x, f64::INFINITY), x };
+                for repeat in 0..REPEATS {
+                    let seed = repeat << 32 | (round * STARTS + k) as u64;
+                    let before = best.cost;
+                    best = evolve(best, width, (steps, seed), &mut cost);
+                    if before - best.cost < GAINED {
+                        break;
+                    }
+                }
+                best
             });
             let mut found: Vec<Point> = searched.collect();
             found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -72,6 +85,10 @@ impl Search<'_> {
             }
             refused = why;
             let new: Vec<usize> = missed.into_iter().filter(|k| !active.contains(k)).take(ADDED).collect();
+            // The limits exclude each other at plants that the search knew: a further round would end at the same point.
+            if new.is_empty() && round > 0 {
+                break;
+            }
             active.extend(new);
             starts = found.into_iter().take(2).map(|p| p.x).collect();
         }

@@ -119,7 +119,10 @@ const runs = (() => {
   // The frame is as high as its report, so that the page alone scrolls: it tells its height and the place of each part to which a link leads.
   function reporting() {
     const root = document.documentElement, told = (/** @type {object} */ what) => parent.postMessage(what, "*");
-    new ResizeObserver(() => told({ height: Math.ceil(root.getBoundingClientRect().height) })).observe(root);
+    const height = () => told({ height: Math.ceil(root.getBoundingClientRect().height) });
+    new ResizeObserver(height).observe(root);
+    // A frame that is out of sight is not rendered, so that nothing observes its size: the size is asked for once more when all of it is there.
+    addEventListener("load", height);
     // The address of the frame is none that its own links could lead to.
     addEventListener("click", event => {
       const link = event.target instanceof Element && event.target.closest("a[href^='#']"), part = link && document.querySelector(link.getAttribute("href") ?? "");

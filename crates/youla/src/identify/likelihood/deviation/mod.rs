@@ -8,6 +8,7 @@
 //! (Burnham and Anderson, Model selection and multimodel inference, section 2.9): with Schwarz's, 95 % intervals of a 2 x 2 plant of four lags
 //! under slow noise held 60 %, as two poles for four were the better choice, and wrong.
 
+mod finite;
 pub(crate) mod innovation;
 pub(crate) mod interpolation;
 pub(crate) mod mode_estimates;
@@ -218,7 +219,8 @@ impl Directions {
 
     /// Mean squares of the error of each entry by their causes.
     pub(crate) fn parts(&self, share: f64) -> Parts {
-        let Columns { squares, rivals, variation, distortion, .. } = self.columns(share);
+        let Columns { parameters, squares, rivals, variation, distortion } = self.columns(share);
+        let squares = self.finite(share, &delayed(&self.model, &self.delays, share), &parameters, &squares);
         let noise: Vec<f64> = squares.iter().map(|square| square / self.scatter).collect();
         let choice = |i: usize| (0..rivals.ncols()).map(|k| rivals[(i, k)].norm_sqr()).sum::<f64>();
         Parts {

@@ -197,7 +197,7 @@ impl Records<'_> {
         let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
         let witness = signals.and_then(|signals| Witness::new(&problem, solution, signals, verification));
         let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, solution);
-        let nuisance = found.nuisance(&problem, &spectra);
+        let nuisance = found.nuisance(&problem, choice, &spectra);
         let scatter = (widening * parts.scatter, &nuisance);
         let directions = Directions::new(&spectra, solution, scatter, witness.clone())
             .with(nonlinear_part, self.interpolated.clone());

@@ -295,7 +295,7 @@ fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
     let Some(excited) = witness.excited(on.spectra) else {
         return Evidence::untested(question, INFORMATION_RATIO, "the excitation does not reach every input");
     };
-    let alone = Solution { rivals: Vec::new(), ..on.solution.clone() };
+    let alone = Solution { rivals: Vec::new(), unseen: None, ..on.solution.clone() };
     let directions = Directions::new(&excited, &alone, (1.0, &Nuisance::default()), None);
     let shares = [slow(on.spectra.samples()), grid(on.spectra.samples())].concat();
     let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &shares, directions);

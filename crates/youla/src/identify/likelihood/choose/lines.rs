@@ -73,8 +73,8 @@ impl Cleaned {
     }
 
     /// The columns of what was estimated beside the model of the records of estimation.
-    pub(crate) fn nuisance(&self, problem: &Problem<'_>, spectra: &Spectra) -> Nuisance {
-        let of = |steps: &Steps| loads::nuisance(problem, &self.solution.chosen, &steps[0], spectra);
+    pub(crate) fn nuisance(&self, problem: &Problem<'_>, choice: &Choice, spectra: &Spectra) -> Nuisance {
+        let of = |steps: &Steps| loads::nuisance(problem, choice, &steps[0], spectra);
         self.steps.as_ref().filter(|steps| loads::in_estimation(steps)).map(of).unwrap_or_default()
     }
 

@@ -7,6 +7,7 @@ mod line_fit;
 pub(crate) mod lines;
 pub(crate) mod loads;
 pub(crate) mod neighbours;
+mod own_noise;
 mod places;
 pub(crate) mod problem;
 pub(crate) mod resize;

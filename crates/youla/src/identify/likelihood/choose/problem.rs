@@ -84,8 +84,19 @@ pub(crate) struct Solution {
     pub(crate) chosen: Choice,
     /// Models whose likelihood is close.
     pub(crate) rivals: Vec<Choice>,
+    /// The model with the modes that only the noise shows, a rival of equal weight: where the excitation shows nothing, the records do not say
+    /// whether plant or noise has them.
+    pub(crate) unseen: Option<Choice>,
     /// Samples of all records.
     pub(crate) samples: usize,
+}
+
+impl Solution {
+    /// The rivals with the criteria of their weights.
+    pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Choice, f64)> {
+        let close = self.rivals.iter().map(|c| (c, c.as_rival(self.samples)));
+        close.chain(self.unseen.iter().map(|c| (c, self.chosen.as_rival(self.samples))))
+    }
 }
 
 /// A search to be done.

@@ -7,8 +7,6 @@ use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use super::wide;
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
-use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::search::free_gain::with_free_gain;
 use crate::identify::likelihood::search::{SearchOptions, search, with_best_ends, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
@@ -29,8 +27,6 @@ const WRONG_DELAY: f64 = 60.0;
 /// Distance of an unstable pole of a loop from the poles of the plant, over its distance from the unit circle, from which the feedback moves it.
 /// Loops that lack one of several slow modes have 15 to 30.
 const MOVED: f64 = 5.0;
-/// Coefficients of the noise up to which it is that of the outputs: a pole and a zero describe drift.
-const FEW: usize = 3;
 /// Decrease of the deviance that the last search leaves at most: a hundredth of a standard deviation along any direction, so that the last digits of
 /// a log do not show in the model.
 const CONVERGED: f64 = 1e-4;
@@ -71,7 +67,7 @@ impl Problem<'_> {
         let here = self.with_feedthrough(now);
         let mut at = here.improved(&mut tried, table)?;
         if self.stops_at(&at) {
-            return Some(Solution { chosen: at, rivals: Vec::new(), samples });
+            return Some(Solution { chosen: at, rivals: Vec::new(), unseen: None, samples });
         }
         let here = here.with_moving_filter(&mut tried, &mut at, table)?;
         here.walk_through_unstable(&mut tried, &at, table);
@@ -125,53 +121,11 @@ impl Problem<'_> {
         }
         let least = tried.iter().map(|c| c.as_rival(samples)).fold(f64::INFINITY, f64::min);
         let rivals = tried.into_iter().filter(|c| c.as_rival(samples) <= least + BESIDE).collect();
-        Some(Solution { chosen, rivals, samples })
-    }
-
-    /// The model with noise by paths of its own where the records ask for it, and their lines.
-    pub(crate) fn with_own_noise(&self, solution: &Solution) -> (Solution, Spectra) {
-        let chosen = &solution.chosen;
-        let spectra = self.spectra(&chosen.delays);
-        let freed = self.freed(&spectra, chosen).unwrap_or_else(|| chosen.clone());
-        (Solution { chosen: freed, ..solution.clone() }, spectra)
-    }
-
-    /// A model with such noise; `None` where the criterion is not less, and where the feedback does not stabilise it.
-    fn freed(&self, spectra: &Spectra, choice: &Choice) -> Option<Choice> {
-        let found = with_free_gain(spectra, &choice.found, &self.options(20, 0.01, &choice.delays))?;
-        let freed = Choice { found, ..choice.clone() };
-        (self.unstable_poles(&freed).is_empty() || !choice.stabilised()).then_some(freed)
-    }
-
-    /// The criterion of a model with such noise where that is less.
-    fn with_free_noise(&self, choice: &Choice) -> f64 {
-        let spectra = self.spectra(&choice.delays);
-        let freed = self.freed(&spectra, choice).map(|freed| freed.found.criterion(spectra.samples()));
-        freed.map_or(choice.criterion, |criterion| criterion.min(choice.criterion))
-    }
-
-    /// With a filter that moves in every search, where that of the noise at the input of one output leads to a better model: from long regressions
-    /// searches end at worse models with it for some records, without it for others. Where no noise enters at the inputs, no filter moves.
-    fn with_moving_filter(self, tried: &mut Vec<Choice>, at: &mut Choice, table: &mut Vec<Candidate>) -> Option<Self> {
-        let noise = &at.found.noise;
-        if self.outputs() > 1 || self.samples().0 > LONG || noise.joint.is_none() || noise.parameters() <= FEW {
-            return Some(self);
-        }
-        let moving = Problem { filter_moves: true, ..self.clone() };
-        let same = Task { origin: "the same with a filter that moves".into(), ..moving.same(at) };
-        let mut found = moving.run(vec![same], f64::INFINITY, table);
-        found.extend(moving.regressed(table));
-        let better = moving.improved(&mut found, table)?;
-        if moving.with_free_noise(&better) >= self.with_free_noise(at) - 0.5 {
-            return Some(self);
-        }
-        tried.extend(found);
-        *at = better;
-        Some(moving)
+        Some(Solution { chosen, rivals, unseen: None, samples })
     }
 
     /// Models one step away as long as the criterion falls.
-    fn improved(&self, tried: &mut Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Choice> {
+    pub(super) fn improved(&self, tried: &mut Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Choice> {
         let mut at = best(tried)?.clone();
         for _ in 0..ROUNDS {
             if self.out_of_time() || self.stops_at(&at) {
@@ -269,7 +223,7 @@ impl Problem<'_> {
     }
 
     /// Searches from long regressions, without dead time and with that which a long regression shows.
-    fn regressed(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
+    pub(super) fn regressed(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let zero = vec![0; self.inputs()];
         let count = if self.is_wide() { 1 } else { FIRST };
         let mut tasks = match &self.dead_time {

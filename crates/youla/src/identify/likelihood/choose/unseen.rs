@@ -23,12 +23,9 @@ pub(crate) struct WithoutUnseen {
 }
 
 impl WithoutUnseen {
-    /// The same with the model that has the modes as a rival of equal weight: where the excitation shows nothing, the records do not say whether
-    /// plant or noise has them, and the region holds what they would do in the plant.
+    /// The same with the model that has the modes as a rival of equal weight: the region holds what they would do in the plant.
     pub(crate) fn beside(mut self, with: &Choice) -> Self {
-        let Solution { chosen, rivals, samples } = &mut self.found.solution;
-        let criterion = with.criterion + chosen.as_rival(*samples) - with.as_rival(*samples);
-        rivals.push(Choice { criterion, ..with.clone() });
+        self.found.solution.unseen = Some(with.clone());
         self
     }
 
@@ -107,9 +104,9 @@ mod tests {
         assert!(left.order() == 1 && pole.im == 0.0 && (0.8..1.0).contains(&pole.re), "{} {pole}", left.order());
         assert!(less.turns.len() == 1 && (less.turns[0] - 0.1).abs() < 1e-3, "{:?}", less.turns);
         let beside = without(&|turns| turns < 0.05).unwrap().beside(&now.solution.chosen).found.solution;
-        let (last, samples) = (beside.rivals.last().unwrap(), beside.samples);
+        let (last, criterion) = beside.weighed().last().unwrap();
         assert_eq!(last.order(), 3);
-        assert!((last.as_rival(samples) - beside.chosen.as_rival(samples)).abs() < 1e-6);
+        assert_eq!(criterion, beside.chosen.as_rival(beside.samples));
         let evidence = less.evidence(1e-3);
         assert!(evidence.holds() && evidence.note.starts_with("at 100."), "{evidence}");
     }

@@ -131,8 +131,8 @@ impl Directions {
         let chart = Chart::new(&found.point.model, found.feedthrough);
         let root = Root::new(spectra, &found.point, &chart, &found.noise, nuisance).scaled(scatter.sqrt());
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
-        let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
-        let rivals = solution.rivals.iter().map(of);
+        let of = |(c, criterion): (&Choice, f64)| (c.found.point.model.clone(), c.delays.clone(), criterion);
+        let rivals = solution.weighed().map(of);
         let seen = witness.map(|w| [w.distortion, w.variation, w.against_fresh]);
         Directions { scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }.with_seen(seen)
     }

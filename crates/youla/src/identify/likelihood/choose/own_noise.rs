@@ -21,7 +21,9 @@ impl Problem<'_> {
         let spectra = self.spectra(&chosen.delays);
         let Some(freed) = self.freed(&spectra, chosen) else { return (solution.clone(), spectra) };
         let rivals: Vec<Choice> = self.closest(solution).into_par_iter().map(|c| self.with_free_noise(c)).collect();
-        let better = rivals.iter().filter(|c| c.criterion < freed.criterion - INDISTINCT);
+        // A larger model has states for the noise, which K describes: of four that were distinctly better three were worse models of the plant.
+        let smaller = rivals.iter().filter(|c| c.order() <= freed.order());
+        let better = smaller.filter(|c| c.criterion < freed.criterion - INDISTINCT);
         let best = better.min_by(|a, b| a.criterion.total_cmp(&b.criterion)).unwrap_or(&freed).clone();
         let spectra = if best.delays == freed.delays { spectra } else { self.spectra(&best.delays) };
         let rivals = std::iter::once(freed).chain(rivals).collect();

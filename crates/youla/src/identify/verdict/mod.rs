@@ -40,7 +40,7 @@ use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::response_error::ResponseError;
-use crate::identify::likelihood::deviation::{Directions, grid, slow};
+use crate::identify::likelihood::deviation::{Directions, grid};
 use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
@@ -297,8 +297,8 @@ fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
     };
     let alone = Solution { rivals: Vec::new(), unseen: None, ..on.solution.clone() };
     let directions = Directions::new(&excited, &alone, (1.0, &Nuisance::default()), None);
-    let shares = [slow(on.spectra.samples()), grid(on.spectra.samples())].concat();
-    let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &shares, directions);
+    // The ratio asks for its own frequencies: no deviations are stated anywhere.
+    let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &[], directions);
     let r = LoopRatio::new(&loops.at, |hz| region.at(hz));
     let evidence = Evidence::new(question, r.largest.min(NO_INFORMATION), INFORMATION_RATIO).at([r.largest_hz; 2]);
     evidence.remedy("excite the loop there, or longer")

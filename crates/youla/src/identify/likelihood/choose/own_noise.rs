@@ -48,6 +48,7 @@ impl Problem<'_> {
     fn freed(&self, spectra: &Spectra, choice: &Choice) -> Option<Choice> {
         let found = with_free_gain(spectra, &choice.found, &self.options(20, 0.01, &choice.delays))?;
         let samples = spectra.samples();
+        // With the penalties of the choice.
         let criterion = choice.criterion + found.criterion(samples) - choice.found.criterion(samples);
         let freed = Choice { found, criterion, ..choice.clone() };
         (self.unstable_poles(&freed).is_empty() || !choice.stabilised()).then_some(freed)

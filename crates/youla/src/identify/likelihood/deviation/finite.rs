@@ -19,7 +19,8 @@ const SMALL: f64 = 0.05;
 impl Directions {
     /// Mean squares of the errors of the entries of `g` by the parameters, of which `errors` and `squares` are those to first order.
     ///
-    /// With the outputs told apart (many channels) it is to first order: a step of all parameters for every entry would cost their number squared.
+    /// Where each output has parameters of its own (eight outputs and more) it is to first order: a step of all parameters for every entry would cost
+    /// their number squared.
     pub(super) fn finite(&self, share: f64, g: &[c64], errors: &ResponseError, squares: &[f64]) -> Vec<f64> {
         let of = |(i, square): (usize, &f64)| match errors.own.is_empty() && square.sqrt() > SMALL * g[i].norm() {
             true => self.finite_entry(share, (i, g[i]), errors, *square),
@@ -35,8 +36,8 @@ impl Directions {
         let along: Vec<f64> = row.iter().map(|d| (d * turn).re).collect();
         let first = along.iter().map(|d| d * d).sum::<f64>();
         let moved = |s: f64| {
-            let errors: Vec<f64> = along.iter().map(|d| s * d / first.sqrt()).collect();
-            let (model, delays) = self.moved(&errors);
+            let step: Vec<f64> = along.iter().map(|d| s * d / first.sqrt()).collect();
+            let (model, delays) = self.moved(&step);
             (delayed(&model, delays, share)[entry] - g).norm_sqr() / (s * s)
         };
         let most = STEPS.into_iter().map(moved).filter(|square| square.is_finite()).fold(first, f64::max);

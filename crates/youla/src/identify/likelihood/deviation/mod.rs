@@ -219,8 +219,8 @@ impl Directions {
 
     /// Mean squares of the error of each entry by their causes.
     pub(crate) fn parts(&self, share: f64) -> Parts {
-        let Columns { parameters, squares, rivals, variation, distortion } = self.columns(share);
-        let squares = self.finite(share, &delayed(&self.model, &self.delays, share), &parameters, &squares);
+        let Columns { g, parameters, squares, rivals, variation, distortion } = self.columns(share);
+        let squares = self.finite(share, &g, &parameters, &squares);
         let noise: Vec<f64> = squares.iter().map(|square| square / self.scatter).collect();
         let choice = |i: usize| (0..rivals.ncols()).map(|k| rivals[(i, k)].norm_sqr()).sum::<f64>();
         Parts {
@@ -274,12 +274,14 @@ impl Directions {
         for output in &self.interpolated {
             output.add(share, &mut distortion, m, &|share| delayed(&self.model, &self.delays, share));
         }
-        Columns { parameters, squares, rivals, variation, distortion }
+        Columns { g, parameters, squares, rivals, variation, distortion }
     }
 }
 
-/// Errors at a frequency: those of the parameters with their mean squares, columns of rivals, and mean squares of what has no phase.
+/// The response at a frequency and its errors: those of the parameters with their mean squares, columns of rivals, and mean squares of what has no
+/// phase.
 struct Columns {
+    g: Vec<c64>,
     parameters: ResponseError,
     squares: Vec<f64>,
     rivals: Mat<c64>,

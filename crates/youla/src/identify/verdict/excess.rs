@@ -92,7 +92,7 @@ impl Excess {
         let mut out = vec![false; self.bands.first().map_or(0, |band| band.squares.len())];
         let units: Vec<Vec<f64>> = self.bands.iter().map(|band| band.units(squares)).collect();
         for band in &self.bands {
-            let means = self.means(band.share, squares(band.share), |near| units[near].clone());
+            let means = self.means(band.share, squares(band.share), |near| units[near].as_slice());
             out.iter_mut()
                 .zip(means)
                 .for_each(|(o, (_, mean))| *o |= mean.excess > 1.0 && mean.deviations > deviations);
@@ -106,16 +106,17 @@ impl Excess {
     }
 
     /// The same, given the squares of the units at the frequency and those of a band.
-    fn means(
+    fn means<U: AsRef<[f64]>>(
         &self,
         share: f64,
         squares: Vec<f64>,
-        units: impl Fn(usize) -> Vec<f64>,
+        units: impl Fn(usize) -> U,
     ) -> impl Iterator<Item = (f64, Mean)> {
-        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).map(|k| (&self.bands[k], units(k))).collect();
+        let near: Vec<(&ExcessBand, U)> = self.window(share).map(|k| (&self.bands[k], units(k))).collect();
         squares.into_iter().enumerate().map(move |(i, square)| {
-            let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * square);
-            (square, beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY)))))
+            let of_entry = near.iter().map(|(band, units)| (*band, i, units.as_ref()[i]));
+            let alike = of_entry.filter(|(.., unit)| *unit >= LEAST_UNIT * LEAST_UNIT * square);
+            (square, beyond_chance(alike.map(|(band, i, unit)| (band, i, unit.max(TINY)))))
         })
     }
 

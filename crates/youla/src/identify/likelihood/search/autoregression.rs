@@ -114,12 +114,14 @@ const RELATIVE_BIN: f64 = 0.125;
 /// Frequency of the end of the first bin, rad per sample: the first line of a record of 6e7 samples.
 const FIRST_BIN: f64 = 1e-7;
 
-/// Cosines of the ends of the bins, falling.
-static ENDS: LazyLock<Vec<f64>> = LazyLock::new(|| {
-    let next = |w: &f64| Some(w + (RELATIVE_BIN * w).min(BIN));
+static ENDS: LazyLock<Vec<f64>> = LazyLock::new(|| ends_of_bins(BIN));
+
+/// Cosines of the ends of bins up to a width, falling.
+pub(crate) fn ends_of_bins(width: f64) -> Vec<f64> {
+    let next = |w: &f64| Some(w + (RELATIVE_BIN * w).min(width));
     let ends = std::iter::successors(Some(FIRST_BIN), next).take_while(|w| *w < PI);
     ends.map(f64::cos).chain([f64::NEG_INFINITY]).collect()
-});
+}
 
 /// Power in bins, whose lines an autoregression does not resolve.
 pub(crate) struct Binned {

@@ -13,24 +13,21 @@ use super::kalman::Entry;
 use super::size::size;
 use crate::identify::likelihood::data::lanes::Lanes;
 use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::search::autoregression::Regression;
+use crate::identify::likelihood::search::autoregression::{Regression, ends_of_bins};
 use crate::identify::likelihood::search::block::{Block, invert};
 use crate::identify::likelihood::search::model::Model;
 use crate::linalg::{Damping, Trial};
 use faer::prelude::*;
 use faer::{Mat, Side, c64};
 use pulp::Arch;
-use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// Poles c of noise with a colour from which the most likely one is sought, with corners 1 - c from 0.1 down to 1e-4 rad per sample, a factor of 3
 /// apart.
 const COLOURS: [f64; 6] = [0.9, 0.97, 0.99, 0.997, 0.999, 0.9999];
 
-/// Width of a bin over its frequency and largest width, rad per sample: enough for a few variances.
-const RELATIVE_WIDTH: f64 = 0.125;
+/// Largest width of a bin, rad per sample: enough for a few variances.
 const WIDTH: f64 = 0.03;
-/// Frequency of the end of the first bin.
-const FIRST: f64 = 1e-7;
 /// Steps at most, and decrease of the cost below which there are no further ones: the likelihood is flat to half a nat.
 const STEPS: usize = 12;
 const FLAT: f64 = 0.5;
@@ -60,12 +57,8 @@ pub(crate) struct Bins {
     bins: Vec<Bin>,
 }
 
-/// Place of a frequency.
-fn place(omega: f64) -> usize {
-    let turn = WIDTH / RELATIVE_WIDTH;
-    let slow = |omega: f64| ((omega / FIRST).ln() / RELATIVE_WIDTH.ln_1p()).max(0.0) as usize;
-    if omega < turn { slow(omega) } else { slow(turn) + 1 + ((omega - turn) / WIDTH) as usize }
-}
+/// Cosines of the ends of the bins.
+static ENDS: LazyLock<Vec<f64>> = LazyLock::new(|| ends_of_bins(WIDTH));
 
 impl Bins {
     /// Of the residuals of a model, lines x p per record.
@@ -73,16 +66,20 @@ impl Bins {
         let (m, p) = (model.inputs, model.outputs);
         let empty =
             || Bin { count: 0.0, back: c64::ZERO, power: vec![c64::ZERO; p * p], gains: vec![c64::ZERO; m * p * p] };
-        let mut bins: Vec<Bin> = (0..=place(PI)).map(|_| empty()).collect();
+        let mut bins: Vec<Bin> = (0..ENDS.len()).map(|_| empty()).collect();
         let all = vec![hidden(model, longest(spectra), 0..p); p];
         let blocks: Vec<Block> = model.blocks.iter().map(Block::quickened).collect();
         let every = spectra.lines().div_ceil(LINES).max(1);
         for (lines, v) in spectra.records.iter().zip(residuals) {
             let z: Vec<c64> = lines.z.iter().step_by(every).copied().collect();
+            let mut bin = 0;
             let each = |at: usize, (g, lane): (&[Lanes], usize)| {
                 let k = at * every;
                 let g = |x: usize| c64::new(g[x].re[lane], g[x].im[lane]);
-                let bin = &mut bins[place(lines.z[k].arg())];
+                while lines.z[k].re < ENDS[bin] {
+                    bin += 1;
+                }
+                let bin = &mut bins[bin];
                 let (share, twice) = (lines.share[k], lines.weight[k].powi(2));
                 bin.count += share;
                 bin.back += lines.z[k].conj() * share;

@@ -14,6 +14,11 @@ use faer::{Mat, MatRef};
 /// below the rounding of J' J.
 pub(crate) const LEAST_DAMPING: f64 = 1e-20;
 
+/// Least share of a refused step at which another is tried: the value may rise with a higher power than the second.
+const LEAST_SHARE: f64 = 0.2;
+/// Growth of the damping on the way to a step that promises little enough.
+const FINE_GROWTH: f64 = 2.0;
+
 /// The damping and how fast it grows.
 #[derive(Debug, Clone, Copy)]
 pub struct Damping {
@@ -50,9 +55,7 @@ impl Damping {
         loop {
             match trial(self.value) {
                 Trial::Lower { point, ratio } => {
-                    let factor = 1.0 - (2.0 * ratio.clamp(0.0, 1.0) - 1.0).powi(3);
-                    self.value = (self.value * factor.max(1.0 / 3.0)).max(LEAST_DAMPING);
-                    self.growth = 2.0;
+                    self.lower(ratio);
                     return Some(point);
                 }
                 Trial::Rejected => {
@@ -62,6 +65,43 @@ impl Damping {
                 Trial::Negligible => return None,
             }
         }
+    }
+
+    /// The same where a trial costs more than its step. After a refused step the next one tried promises what the share s of it would with the least
+    /// value on the parabola through value, slope and refused value:
+    ///
+    /// ```text
+    /// gain(s) = 2 P s - (2 P - gain(1)) s^2,     s = P / (2 P - gain(1)),     promise s (2 - s) P
+    /// ```
+    ///
+    /// `step` makes one for a damping, with its predicted decrease P, `None` where that is negligible; `judge` gives the actual decrease.
+    pub(crate) fn descend_sparingly<S, T>(
+        &mut self,
+        mut step: impl FnMut(f64) -> Option<(S, f64)>,
+        mut judge: impl FnMut(S) -> Option<(T, f64)>,
+    ) -> Option<T> {
+        let mut limit = f64::INFINITY;
+        loop {
+            let (trial, promised) = step(self.value)?;
+            if promised <= limit {
+                let judged = judge(trial);
+                let gain = judged.as_ref().map_or(f64::NEG_INFINITY, |(_, gain)| *gain);
+                if let Some((point, gain)) = judged.filter(|_| gain > 0.0) {
+                    self.lower(gain / promised);
+                    return Some(point);
+                }
+                let share = (promised / (2.0 * promised - gain)).max(LEAST_SHARE);
+                limit = share * (2.0 - share) * promised;
+            }
+            self.value *= FINE_GROWTH;
+        }
+    }
+
+    /// After a step with such an actual over its predicted decrease.
+    fn lower(&mut self, ratio: f64) {
+        let factor = 1.0 - (2.0 * ratio.clamp(0.0, 1.0) - 1.0).powi(3);
+        self.value = (self.value * factor.max(1.0 / 3.0)).max(LEAST_DAMPING);
+        self.growth = 2.0;
     }
 }
 
@@ -122,6 +162,32 @@ mod tests {
             (point, steps) = (better, steps + 1);
         }
         assert!((point[0] - 1.0).abs() < 1e-9 && (point[1] - 1.0).abs() < 1e-9 && steps < 40, "{point:?} {steps}");
+    }
+
+    /// r = (1 - exp(x), -(x + 8) / 1e6) from -8, where the first step is some hundred times too long: the minimum near 0 in at most 40 trials, each
+    /// after a refused one promising less as the parabola says.
+    #[test]
+    fn refused_steps_are_followed_by_distinctly_shorter_ones() {
+        let residual = |x: f64| Mat::from_fn(2, 1, |i, _| [1.0 - x.exp(), -(x + 8.0) * 1e-6][i]);
+        let (mut x, mut damping, mut trials) = (-8.0_f64, Damping::new(1e-6), 0);
+        loop {
+            let jacobian = Mat::from_fn(2, 1, |i, _| [x.exp(), 1e-6][i]);
+            let (r, scale) = (residual(x), [jacobian.col(0).norm_l2()]);
+            let step = |value: f64| {
+                let step = damped_step(jacobian.as_ref(), r.as_ref(), &scale, value);
+                let promised = decrease(jacobian.as_ref(), r.as_ref(), &step);
+                (promised > 1e-14).then_some(((x + step[(0, 0)], promised), promised))
+            };
+            let mut refused = f64::INFINITY;
+            let lower = damping.descend_sparingly(step, |(trial, promised)| {
+                assert!(promised <= 0.75 * refused, "{promised} after {refused}");
+                (trials, refused) = (trials + 1, promised);
+                Some((trial, r.squared_norm_l2() - residual(trial).squared_norm_l2()))
+            });
+            let Some(lower) = lower else { break };
+            x = lower;
+        }
+        assert!(x.abs() < 1e-6 && trials <= 40, "{x}, {trials}");
     }
 
     /// Columns that depend on each other: the step is finite and shared by both.

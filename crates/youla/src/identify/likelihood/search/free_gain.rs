@@ -19,7 +19,7 @@ use super::separable::separable;
 use super::{DAMPED, FIRST_DAMPING, Found, SearchOptions, damped, moved, penalty, value_of, with_slope};
 use crate::identify::likelihood::data::lanes::Lanes;
 use crate::identify::likelihood::data::spectra::Spectra;
-use crate::linalg::{Damping, Trial};
+use crate::linalg::Damping;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side, c64};
 use pulp::Arch;
@@ -184,11 +184,11 @@ impl Search<'_> {
         let places = places_of(model, &self.hidden, gain.nrows());
         // Criteria, for the autoregressions have an order of their own at each trial.
         let now = at.criterion(self.spectra);
-        damping.descend(|damping| {
+        let step = |damping| {
             let (step, promised) = damped(&factor, all, damping);
-            if promised.is_nan() || promised <= options.tolerance {
-                return Trial::Negligible;
-            }
+            (promised > options.tolerance).then_some((step, promised))
+        };
+        damping.descend_sparingly(step, |step| {
             let point = moved(&at.point, &chart, &ends, &step);
             // The entries of K come last, state by state, and behind them the pole of the colours.
             let mut gains = (gain.clone(), colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE)));
@@ -197,11 +197,9 @@ impl Search<'_> {
                 gains.0[(places[x / p], x % p)] += change;
             }
             let inside = point.model.poles().iter().all(|pole| pole.norm() <= options.radius);
-            let trial = self.at(point, gains, &at.noise.covariance).filter(|_| inside);
-            match trial.map(|trial| (now - trial.criterion(self.spectra), trial)) {
-                Some((gain, trial)) if gain > 0.0 => Trial::Lower { point: trial, ratio: gain / promised },
-                _ => Trial::Rejected,
-            }
+            let trial = self.at(point, gains, &at.noise.covariance).filter(|_| inside)?;
+            let gain = now - trial.criterion(self.spectra);
+            Some((trial, gain))
         })
     }
 }

@@ -74,15 +74,20 @@ impl Damping {
     /// gain(s) = 2 P s - (2 P - gain(1)) s^2,     s = P / (2 P - gain(1)),     promise s (2 - s) P
     /// ```
     ///
-    /// `step` makes one for a damping, with its predicted decrease P, `None` where that is negligible; `judge` gives the actual decrease.
+    /// `step` makes one for a damping, with its predicted decrease P; `judge` gives the actual decrease. `None` where P is at most `negligible` or not
+    /// a number.
     pub(crate) fn descend_sparingly<S, T>(
         &mut self,
-        mut step: impl FnMut(f64) -> Option<(S, f64)>,
+        negligible: f64,
+        mut step: impl FnMut(f64) -> (S, f64),
         mut judge: impl FnMut(S) -> Option<(T, f64)>,
     ) -> Option<T> {
         let mut limit = f64::INFINITY;
         loop {
-            let (trial, promised) = step(self.value)?;
+            let (trial, promised) = step(self.value);
+            if promised.is_nan() || promised <= negligible {
+                return None;
+            }
             if promised <= limit {
                 let judged = judge(trial);
                 let gain = judged.as_ref().map_or(f64::NEG_INFINITY, |(_, gain)| *gain);
@@ -176,10 +181,10 @@ mod tests {
             let step = |value: f64| {
                 let step = damped_step(jacobian.as_ref(), r.as_ref(), &scale, value);
                 let promised = decrease(jacobian.as_ref(), r.as_ref(), &step);
-                (promised > 1e-14).then_some(((x + step[(0, 0)], promised), promised))
+                ((x + step[(0, 0)], promised), promised)
             };
             let mut refused = f64::INFINITY;
-            let lower = damping.descend_sparingly(step, |(trial, promised)| {
+            let lower = damping.descend_sparingly(1e-14, step, |(trial, promised)| {
                 assert!(promised <= 0.75 * refused, "{promised} after {refused}");
                 (trials, refused) = (trials + 1, promised);
                 Some((trial, r.squared_norm_l2() - residual(trial).squared_norm_l2()))

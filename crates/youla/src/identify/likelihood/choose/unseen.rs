@@ -153,13 +153,16 @@ mod tests {
             let options = LikelihoodOptions::default();
             let found = recommend(&[estimation], &[fresh], Some(&known), time, &options).unwrap();
             assert!(found.trusted(), "seed {seed}: {:?}", found.reasons());
-            let names = |e: &&Evidence| {
-                let of_disturbance = ["(unseen modes)", "(lines)"].iter().any(|name| e.question.ends_with(name));
-                of_disturbance && ["at 29.", "at 30."].iter().any(|at| e.note.contains(at))
-            };
-            if let Some(disturbance) = found.evidence.iter().find(names) {
-                named += 1;
-                assert_eq!(found.order, 2, "{disturbance}");
+            let of = |name: &str| found.evidence.iter().find(|e| e.question.ends_with(name));
+            for (test, before) in [("(unseen modes)", ""), ("(lines)", "taken out of the outputs ")] {
+                if let Some(disturbance) = of(test) {
+                    named += 1;
+                    let at = disturbance.note.strip_prefix(before).unwrap();
+                    assert!(
+                        found.order == 2 && ["at 29.", "at 30."].iter().any(|near| at.starts_with(near)),
+                        "{disturbance}"
+                    );
+                }
             }
             for share in [0.002, 0.005, 0.01, 0.02, 0.05, 0.1] {
                 let z = c64::cis(TAU * share);

@@ -184,11 +184,8 @@ impl Search<'_> {
         let places = places_of(model, &self.hidden, gain.nrows());
         // Criteria, for the autoregressions have an order of their own at each trial.
         let now = at.criterion(self.spectra);
-        let step = |damping| {
-            let (step, promised) = damped(&factor, all, damping);
-            (promised > options.tolerance).then_some((step, promised))
-        };
-        damping.descend_sparingly(step, |step| {
+        let step = |damping| damped(&factor, all, damping);
+        damping.descend_sparingly(options.tolerance, step, |step| {
             let point = moved(&at.point, &chart, &ends, &step);
             // The entries of K come last, state by state, and behind them the pole of the colours.
             let mut gains = (gain.clone(), colour.map(|pole| (pole + step[all - 1]).clamp(0.0, LARGEST_POLE)));

@@ -215,10 +215,9 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         let step = |damping| {
             let (trial, promised) = slopes.trial(&point, damping);
             first_promise.get_or_insert(promised);
-            // A promise that is not a number ends the search as well.
-            (promised > options.tolerance).then_some((trial, promised))
+            (trial, promised)
         };
-        let lower = damping.descend_sparingly(step, |trial| {
+        let lower = damping.descend_sparingly(options.tolerance, step, |trial| {
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
             let (value, noise) = cost(spectra, &trial, options);
             let usable = value.is_finite() && (options.radius.is_infinite() || inside());
@@ -231,10 +230,12 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
             (point, least, noise) = (reblocked(&trial)?, value, lower_noise);
         }
         if gain < options.tolerance {
-            if moves || !may_move || noise.joint.is_none() || first_promise.is_none_or(|promised| promised <= MISLED) {
+            misled =
+                may_move && !moves && noise.joint.is_some() && first_promise.is_some_and(|promise| promise > MISLED);
+            if !misled {
                 break;
             }
-            (misled, damping) = (true, Damping::new(FIRST_DAMPING));
+            damping = Damping::new(FIRST_DAMPING);
             continue;
         }
         let penalty = penalty(parameters + noise.parameters(), spectra.samples(), &point);

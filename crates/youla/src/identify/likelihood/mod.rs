@@ -196,11 +196,11 @@ impl Records<'_> {
         let parts = Parts::new(&problem, solution, verification);
         let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
         let witness = signals.and_then(|signals| Witness::new(&problem, solution, signals, verification));
-        let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, solution);
+        let (nonlinear, nonlinear_parts) = verdict::nonlinear(&spectra, solution);
         let nuisance = found.nuisance(&problem, choice, &spectra);
         let scatter = (widening * parts.scatter, &nuisance);
         let directions = Directions::new(&spectra, solution, scatter, witness.clone())
-            .with(nonlinear_part, self.interpolated.clone());
+            .with(nonlinear_parts, self.interpolated.clone());
         let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
         let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
         let judged = Judged {

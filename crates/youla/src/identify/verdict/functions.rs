@@ -11,8 +11,10 @@ use rustfft::{Fft, FftPlanner};
 /// A function of an input in units of its size, or of the velocity that it causes.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
-    /// First, so that what stands behind it is what friction does not explain.
+    /// Of an output that is a position. The two kinds of friction are first, so that what stands behind them is what friction does not explain.
     Friction,
+    /// Of an output that is a velocity.
+    FrictionAtSpeed,
     Smooth(&'static str, fn(f64) -> f64),
     /// What a limit takes away, `u - clamp(u)`; with the limit below the input, what a dead zone lets pass.
     Beyond(f64),
@@ -22,6 +24,11 @@ pub(super) enum Shape {
 
 /// Velocity of which friction changes its sign, in standard deviations.
 const SMALL_VELOCITY: f64 = 0.1;
+/// Time constants of a plant that a record holds at least where its output may be a velocity: an output that integrates the input for longer is
+/// a position, whose sign follows slow loads.
+const TIME_CONSTANTS: f64 = 10.0;
+/// Kinds of friction.
+pub(super) const FRICTIONS: usize = 2;
 /// Limits that are tried first, and those of which the most significant is taken where a function of the input explains too much of the output:
 /// from a dead zone of a twentieth of the input to a limit that one sample in 700 of normal noise exceeds. What a limit between two of them
 /// takes away is nearly a sum of what both take.
@@ -36,12 +43,14 @@ impl Shape {
             Shape::Smooth("u^2", |u| u * u),
         ];
         let beyond = limits.iter().map(|limit| Shape::Beyond(*limit));
-        [Shape::Friction].into_iter().chain(smooth).chain(beyond).chain([Shape::Backlash]).collect()
+        let frictions: [Self; FRICTIONS] = [Shape::Friction, Shape::FrictionAtSpeed];
+        frictions.into_iter().chain(smooth).chain(beyond).chain([Shape::Backlash]).collect()
     }
 
     pub(super) fn name(self) -> String {
         match self {
             Shape::Friction => "dry friction".into(),
+            Shape::FrictionAtSpeed => "dry friction, the output being a speed".into(),
             Shape::Smooth(name, _) => name.into(),
             Shape::Beyond(limit) if limit < 0.5 => format!("a dead zone of {limit} deviations"),
             Shape::Beyond(limit) => format!("saturation at {limit} deviations"),
@@ -51,7 +60,7 @@ impl Shape {
 
     fn of(self, value: f64) -> f64 {
         match self {
-            Shape::Friction | Shape::Backlash => (value / SMALL_VELOCITY).tanh(),
+            Shape::Friction | Shape::FrictionAtSpeed | Shape::Backlash => (value / SMALL_VELOCITY).tanh(),
             Shape::Smooth(_, f) => f(value),
             Shape::Beyond(limit) => value - value.clamp(-limit, limit),
         }
@@ -66,6 +75,8 @@ pub(super) struct Shaped {
     pub(super) sizes: Vec<f64>,
     /// Lines of the functions, those of one after the other.
     pub(super) plain: Vec<Vec<c64>>,
+    /// The output that each input moves most.
+    pub(super) seen: Vec<usize>,
 }
 
 /// The functions of one record seen through the model, lines x p x functions.
@@ -80,10 +91,11 @@ pub(super) fn columns(
     let (drift, count) = (shapes.len() * m, shapes.len() * m + 1);
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
-    let (mut sizes, mut plain) = (vec![0.0; drift], vec![Vec::new(); drift]);
+    let (mut sizes, mut plain, mut moved_most) = (vec![0.0; drift], vec![Vec::new(); drift], vec![0; m]);
     // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
     let grows = model.poles().iter().any(|p| p.norm() > 1.0);
     let moved = if grows { &lines.y } else { clean };
+    let integrates = model.poles().iter().any(|p| p.norm().ln().abs() * (lines.samples as f64) < TIME_CONSTANTS);
     let root = (lines.samples as f64).sqrt();
     let fft = planner.plan_fft_forward(lines.samples);
     for i in 0..p {
@@ -96,13 +108,16 @@ pub(super) fn columns(
         // velocity of the output that this input moves most
         let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
         let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
-        let mut velocity_of =
-            |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen] * (c64::ONE - lines.z[k].conj())).1;
-        let without_noise = velocity_of(clean);
-        let measured = grows.then(|| velocity_of(moved));
-        let velocity = measured.as_ref().unwrap_or(&without_noise);
+        moved_most[j] = seen;
+        let mut output =
+            |y: &[c64], of: fn(c64) -> c64| in_time(lines, planner, |k| y[k * p + seen] * of(lines.z[k])).1;
+        let velocity: fn(c64) -> c64 = |z| c64::ONE - z.conj();
+        let without_noise = output(clean, velocity);
+        let measured = grows.then(|| output(moved, velocity));
+        let speed = output(moved, |_| c64::ONE);
         let base = |shape: Shape| match shape {
-            Shape::Friction => velocity,
+            Shape::Friction => measured.as_ref().unwrap_or(&without_noise),
+            Shape::FrictionAtSpeed => &speed,
             Shape::Backlash => &without_noise,
             _ => &u,
         };
@@ -119,13 +134,14 @@ pub(super) fn columns(
                 let column = |i: usize| (k * p + i) * count + f;
                 match shape {
                     Shape::Backlash => columns[column(seen)] = of_shape[k],
+                    Shape::FrictionAtSpeed if integrates => {}
                     _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * of_shape[k]),
                 }
             }
             plain[f] = of_shape;
         }
     }
-    Shaped { columns, sizes, plain }
+    Shaped { columns, sizes, plain, seen: moved_most }
 }
 
 /// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.

@@ -4,11 +4,11 @@
 //! ```text
 //! y - G u = G f theta + b beta + x G u delta + e,     f = u^3, u |u|, u^2, u beyond a limit, tanh(velocity / small)
 //! ```
-//! Dry friction is a function of the velocity at the input, backlash one at the output, b = tanh(velocity / small), and a drift of the gain
-//! has x from -1 to 1 over the records. theta, beta and delta are estimated together with the parameters of the model, to which the
-//! linear and constant parts belong.
+//! Dry friction is a function at the input of a velocity: of the output or of its difference. Backlash is one at the output,
+//! b = tanh(velocity / small). A drift of the gain has x from -1 to 1 over the records. theta, beta and delta are estimated together with the
+//! parameters of the model, to which the linear and constant parts belong.
 
-use super::functions::{FINE_LIMITS, LIMITS, Shape, Shaped, columns};
+use super::functions::{FINE_LIMITS, FRICTIONS, LIMITS, Shape, Shaped, columns};
 use super::limits::{
     BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LARGEST_PLAY,
     LASTING,
@@ -28,44 +28,66 @@ use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
 use rustfft::FftPlanner;
 
-/// What acts at an input and is no linear function of it, over frequency.
+/// A channel of the plant.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+enum Channel {
+    Input(usize),
+    Output(usize),
+}
+
+/// What acts at an input, or at an output, and is no linear function of it, over frequency.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct NonlinearPart {
-    /// The input.
-    pub(crate) input: usize,
-    /// Middles of bands as shares of the sample rate, power of this part, and of the input.
+    channel: Channel,
+    /// Middles of bands as shares of the sample rate, power of this part, and of the channel.
     bands: Vec<[f64; 3]>,
 }
 
 impl NonlinearPart {
-    /// Bands of 40 lines: of `c f` what no response to the input gives.
-    fn new(spectra: &Spectra, shaped: &[Shaped], input: usize, of: usize, c: f64) -> Self {
-        let m = spectra.inputs;
-        let lines = spectra.records.iter().map(|lines| lines.z.len()).min().unwrap_or(0);
+    /// Bands of 40 lines: of `c f` what no response to the channel gives. `parts` holds for each record the lines of f and of the channel.
+    fn new<'a>(channel: Channel, c: f64, parts: impl Iterator<Item = (&'a [c64], Vec<c64>)> + Clone) -> Self {
+        let lines = parts.clone().map(|(f, _)| f.len()).min().unwrap_or(0);
         let count = (lines / BAND_LINES).max(1);
         let mut sums = vec![(0.0, c64::ZERO, 0.0); count];
-        for (lines, shaped) in spectra.records.iter().zip(shaped) {
-            let total = lines.z.len();
-            for (k, f) in shaped.plain[of].iter().enumerate() {
-                let (sum, u) = (&mut sums[(k * count / total).min(count - 1)], lines.u[k * m + input]);
-                *sum = (sum.0 + f.norm_sqr(), sum.1 + f * u.conj(), sum.2 + u.norm_sqr());
+        for (f, x) in parts {
+            let total = f.len();
+            for (k, (f, x)) in f.iter().zip(x).enumerate() {
+                let sum = &mut sums[(k * count / total).min(count - 1)];
+                *sum = (sum.0 + f.norm_sqr(), sum.1 + f * x.conj(), sum.2 + x.norm_sqr());
             }
         }
-        let band = |(k, (f, fu, u)): (usize, (f64, c64, f64))| {
-            [0.5 * (k as f64 + 0.5) / count as f64, c * c * (f - fu.norm_sqr() / u.max(TINY)).max(0.0), u]
+        let band = |(k, (f, fx, x)): (usize, (f64, c64, f64))| {
+            [0.5 * (k as f64 + 0.5) / count as f64, c * c * (f - fx.norm_sqr() / x.max(TINY)).max(0.0), x]
         };
-        NonlinearPart { input, bands: sums.into_iter().enumerate().map(band).collect() }
+        NonlinearPart { channel, bands: sums.into_iter().enumerate().map(band).collect() }
     }
 
-    /// Whether it is that of a plant with so many inputs.
+    /// Whether it is that of a plant with so many outputs and inputs.
     #[cfg(feature = "serde")]
-    pub(crate) fn is_of(&self, inputs: usize) -> bool {
-        self.input < inputs && !self.bands.is_empty()
+    pub(crate) fn is_of(&self, (outputs, inputs): (usize, usize)) -> bool {
+        let within = match self.channel {
+            Channel::Input(input) => input < inputs,
+            Channel::Output(output) => output < outputs,
+        };
+        within && !self.bands.is_empty()
+    }
+
+    /// Adds the mean square of the error of the response that stays of it at a frequency, a share of the sample rate, to those of the entries
+    /// (p x m) of the response g.
+    pub(crate) fn add(&self, share: f64, errors: &mut [f64], inputs: usize, g: &[c64]) {
+        let ratio = self.near(share);
+        let of_channel = |entry: usize| match self.channel {
+            Channel::Input(input) => entry % inputs == input,
+            Channel::Output(output) => entry / inputs == output,
+        };
+        let moved = errors.iter_mut().enumerate().filter(|(entry, _)| of_channel(*entry));
+        moved.for_each(|(entry, error)| *error += g[entry].norm_sqr() * ratio);
     }
 
     /// Mean square of the error of the response that stays of it, relative to the response, over a third of an octave.
-    pub(crate) fn near(&self, share: f64) -> f64 {
+    fn near(&self, share: f64) -> f64 {
         let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
         let first = self.bands.partition_point(|b| b[0] < from).min(self.bands.len() - 1);
         let end = self.bands.partition_point(|b| b[0] <= to).max(first + 1);
@@ -77,7 +99,7 @@ impl NonlinearPart {
 /// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input? Beyond chance it comes
 /// with its power over frequency. Where one of a few functions explains too much of the output, its limit is searched, and what counts as
 /// unknown is what it leaves.
-pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence>, Option<NonlinearPart>) {
+pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence>, Vec<NonlinearPart>) {
     let beside = Beside::new(spectra, solution, Shape::all(&LIMITS));
     let unknown = beside.unknown(None);
     if unknown.holds() {
@@ -94,6 +116,8 @@ struct Beside<'a> {
     model: &'a Model,
     shapes: Vec<Shape>,
     records: Vec<Shaped>,
+    /// Lines of the outputs of each record without what the model leaves, lines x p.
+    clean: Vec<Vec<c64>>,
     /// Energy of what the model explains, in standard deviations of the noise.
     explained: f64,
     /// `[R r]` of the functions, those of a shape for each input together, then the drift of the gain.
@@ -128,7 +152,7 @@ impl<'a> Beside<'a> {
         let extra = Extra { count, values: &values, quick: false, filter: Filter::Held };
         let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
         let explained = energy(spectra, &clean, &found.noise).max(TINY);
-        Beside { spectra, model, shapes, records, explained, factor, lengths }
+        Beside { spectra, model, shapes, records, clean, explained, factor, lengths }
     }
 
     fn drift(&self) -> usize {
@@ -166,7 +190,7 @@ impl<'a> Beside<'a> {
 
     /// What the functions of the inputs explain of the output beyond friction and a known one.
     fn unknown(&self, known: Option<usize>) -> Evidence {
-        let first = self.spectra.inputs;
+        let first = FRICTIONS * self.spectra.inputs;
         let distinct = |i: &usize| self.factor[(*i, *i)].powi(2) > DISTINCT * self.lengths[*i];
         let behind: Vec<usize> = (first..self.at_inputs().end.min(self.factor.nrows())).filter(distinct).collect();
         let residual = self.drift() + 1;
@@ -179,31 +203,56 @@ impl<'a> Beside<'a> {
         Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(chi_square_deviations(statistic, count))
     }
 
-    fn evidence(&self, unknown: Evidence) -> (Vec<Evidence>, Option<NonlinearPart>) {
+    fn evidence(&self, unknown: Evidence) -> (Vec<Evidence>, Vec<NonlinearPart>) {
         let inputs = self.spectra.inputs;
         let f = self.most_significant();
         let (c, significance) = self.single(f);
         let size = c * self.records.iter().map(|s| s.sizes[f]).sum::<f64>() / self.records.len().max(1) as f64;
         let found = significance > BEYOND_CHANCE;
-        let nonlinear_part = found.then(|| NonlinearPart::new(self.spectra, &self.records, f % inputs, f, c));
+        let mut parts: Vec<NonlinearPart> = found.then(|| self.part(f, c)).into_iter().collect();
         let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
         let mut of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).beyond_chance(significance);
         if found {
             let name = self.shapes[f / inputs].name();
             of_size = of_size.noted(format!("most likely {name} at input {}", f % inputs + 1));
         }
-        let backlash = self.single(self.most(self.at_inputs().end..self.drift()));
-        let of_play = play(self.model, backlash, significance);
+        let at_output = self.most(self.at_inputs().end..self.drift());
+        let (c, of_backlash) = self.single(at_output);
+        let loose = of_backlash > BEYOND_CHANCE.max(significance) && !runs_away(self.model);
+        parts.extend(loose.then(|| self.part(at_output, c)));
+        let of_play = play(self.model, (c, of_backlash), loose);
         let (c, significance) = self.single(self.drift());
         let question = "Change of the gain from the first sample to the last, over the gain (drift of the gain)";
         let of_drift =
             Evidence::new(question, 2.0 * c.abs(), LARGEST_CHANGE_OF_GAIN).beyond_chance(significance).reported();
-        (vec![of_size, unknown, of_play, of_drift], nonlinear_part)
+        (vec![of_size, unknown, of_play, of_drift], parts)
+    }
+
+    /// What a function with its coefficient adds to its channel.
+    fn part(&self, f: usize, c: f64) -> NonlinearPart {
+        let (m, p) = (self.spectra.inputs, self.spectra.outputs);
+        let input = f % m;
+        let lines = |shaped: &Shaped| match f < self.at_inputs().end {
+            true => Channel::Input(input),
+            false => Channel::Output(shaped.seen[input]),
+        };
+        let channel = self.records.first().map_or(Channel::Input(input), lines);
+        let of_channel = move |(record, clean): (usize, &Vec<c64>)| -> Vec<c64> {
+            match channel {
+                Channel::Input(input) => {
+                    self.spectra.records[record].u.iter().skip(input).step_by(m).copied().collect()
+                }
+                Channel::Output(output) => clean.iter().skip(output).step_by(p).copied().collect(),
+            }
+        };
+        let channels = self.clean.iter().enumerate().map(of_channel);
+        NonlinearPart::new(channel, c, self.records.iter().map(|shaped| shaped.plain[f].as_slice()).zip(channels))
     }
 }
 
-/// Play by its coefficient, with its deviations beyond chance: friction that is more so moves the output where its velocity changes sign, too.
-fn play(model: &Model, (c, significance): (f64, f64), friction: f64) -> Evidence {
+/// Play by its coefficient, with its deviations beyond chance; `loose` where friction is not more so, which moves the output where its velocity
+/// changes sign, too.
+fn play(model: &Model, (c, significance): (f64, f64), loose: bool) -> Evidence {
     let question = "Play of an output where its velocity changes sign, over the output (backlash)";
     if runs_away(model) {
         let why = "the plant is unstable, and its motion without noise is not known";
@@ -211,7 +260,7 @@ fn play(model: &Model, (c, significance): (f64, f64), friction: f64) -> Evidence
     }
     // tanh goes from -1 to 1: the play is twice its coefficient.
     let of_play = Evidence::new(question, 2.0 * c.abs(), LARGEST_PLAY).beyond_chance(significance).reported();
-    match significance > BEYOND_CHANCE.max(friction) {
+    match loose {
         true => of_play.noted("beyond chance, and more so than dry friction"),
         false => of_play,
     }

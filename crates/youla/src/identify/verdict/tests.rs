@@ -211,6 +211,8 @@ fn a_model_of_neither_half_is_no_model() {
 struct Fault {
     /// Dry friction at the input of the plant, over the standard deviation of the excitation.
     friction: f64,
+    /// The same of an output that is a velocity.
+    drag: f64,
     /// Play at the output, whose size is about 0.5.
     play: f64,
     /// Change of the gain from the first sample to the last.
@@ -221,7 +223,8 @@ struct Fault {
     noise: f64,
 }
 
-const NONE: Fault = Fault { friction: 0.0, play: 0.0, drift: 0.0, limit: f64::INFINITY, dead: 0.0, noise: 0.05 };
+const NONE: Fault =
+    Fault { friction: 0.0, drag: 0.0, play: 0.0, drift: 0.0, limit: f64::INFINITY, dead: 0.0, noise: 0.05 };
 
 fn with_friction(friction: f64) -> Identified {
     with(&Fault { friction, ..NONE })
@@ -242,7 +245,8 @@ fn with(fault: &Fault) -> Identified {
         let gain = 1.0 + fault.drift * (k as f64 / rows as f64 - 0.5);
         let command = u[(k, 0)].clamp(-fault.limit, fault.limit);
         let acts = gain * (command - command.clamp(-fault.dead, fault.dead))
-            - fault.friction * ((moved - before) / 0.005).tanh();
+            - fault.friction * ((moved - before) / 0.005).tanh()
+            - fault.drag * (moved / 0.05).tanh();
         x = g.a() * &x + g.b() * acts;
         before = moved;
     }
@@ -251,18 +255,30 @@ fn with(fault: &Fault) -> Identified {
     identify(&[record], &[], &running, None, &LikelihoodOptions::default()).unwrap()
 }
 
+/// The part of the region at 10 Hz that is distortion.
+fn distortion(found: &Identified) -> f64 {
+    let region = &found.model.region;
+    let k = region.hz.partition_point(|hz| *hz < 10.0);
+    region.parts.distortion[k][(0, 0)]
+}
+
 #[test]
 fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
-    let distortion = |found: &Identified| {
-        let region = &found.model.region;
-        let k = region.hz.partition_point(|hz| *hz < 10.0);
-        region.parts.distortion[k][(0, 0)]
-    };
     let [none, little, much] = [0.0, 0.08, 0.5].map(with_friction);
     assert!(none.trusted() && little.trusted(), "{:?} {:?}", none.reasons(), little.reasons());
     let [of_none, of_little] = [&none, &little].map(distortion);
     assert!(of_none == 0.0 && of_little > 0.005, "{of_none} {of_little}");
     assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
+}
+
+/// Friction against the sign of an output that is a velocity is told from that of a position, and by 2 % of the size of the input.
+#[test]
+fn dry_friction_of_a_speed_is_named_and_widens_the_region() {
+    let found = with(&Fault { drag: 0.08, noise: 0.02, ..NONE });
+    let test = outcome(&found, "(nonlinearity)");
+    assert!(test.note.contains("the output being a speed"), "{test}");
+    assert!((0.01..0.05).contains(&test.figure) && found.trusted(), "{test} {:?}", found.reasons());
+    assert!(distortion(&found) > 0.005, "{}", distortion(&found));
 }
 
 /// Without time for a second round the best start is kept, and a line says so; with time enough nothing is said and nothing changes.
@@ -285,6 +301,8 @@ fn play_at_the_output_is_named() {
     assert!(!play(&loose).required && loose.trusted(), "{:?}", loose.reasons());
     let friction = outcome(&loose, "(nonlinearity)");
     assert!(friction.figure < 0.01, "{friction}");
+    let [of_clean, of_loose] = [&clean, &loose].map(distortion);
+    assert!(of_clean == 0.0 && of_loose > 0.001, "{of_clean} {of_loose}");
 }
 
 /// A gain that rises by 6 % is named within a tenth of its size; that of the clean loop is chance.

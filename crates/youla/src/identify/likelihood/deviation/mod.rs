@@ -92,8 +92,8 @@ pub(crate) struct Directions {
     /// Whether the excitation shows that an entry has another form than the model, by an error beyond that of a band of validity: then no more is
     /// known of the entry anywhere than the excitation shows.
     of_another_form: Vec<bool>,
-    /// What acts at an input and is no linear function of it.
-    nonlinear_part: Option<NonlinearPart>,
+    /// What acts at an input or an output and is no linear function of it.
+    nonlinear: Vec<NonlinearPart>,
     /// The outputs that were interpolated.
     interpolated: Vec<Interpolated>,
 }
@@ -160,14 +160,14 @@ impl Directions {
             scatter: 1.0,
             seen: None,
             of_another_form: Vec::new(),
-            nonlinear_part: None,
+            nonlinear: Vec::new(),
             interpolated: Vec::new(),
         }
     }
 
-    /// The same with what acts at an input and is no linear function of it, and with the outputs that were interpolated.
-    pub(crate) fn with(self, nonlinear_part: Option<NonlinearPart>, interpolated: Vec<Interpolated>) -> Self {
-        Directions { nonlinear_part, interpolated, ..self }
+    /// The same with what acts at an input or an output and is no linear function of it, and with the outputs that were interpolated.
+    pub(crate) fn with(self, nonlinear: Vec<NonlinearPart>, interpolated: Vec<Interpolated>) -> Self {
+        Directions { nonlinear, interpolated, ..self }
     }
 
     /// The same with the errors that the excitation shows.
@@ -266,11 +266,8 @@ impl Directions {
         for (i, variation) in variation.iter_mut().enumerate() {
             *variation = (*variation - squares[i] * (1.0 - 1.0 / self.scatter)).max(0.0);
         }
-        // It moves the outputs as the input does, and does not average out over records of the same kind.
-        if let Some(nonlinear_part) = &self.nonlinear_part {
-            let ratio = nonlinear_part.near(share);
-            (nonlinear_part.input..entries).step_by(m).for_each(|i| distortion[i] += g[i].norm_sqr() * ratio);
-        }
+        // It moves the outputs as its channel does, and does not average out over records of the same kind.
+        self.nonlinear.iter().for_each(|part| part.add(share, &mut distortion, m, &g));
         for output in &self.interpolated {
             output.add(share, &mut distortion, m, &|share| delayed(&self.model, &self.delays, share));
         }

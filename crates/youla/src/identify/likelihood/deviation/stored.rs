@@ -32,7 +32,8 @@ pub(super) struct StoredRegion {
     rivals: Vec<(Model, Vec<usize>, f64)>,
     scatter: f64,
     seen: Option<[Excess; 3]>,
-    nonlinear_part: Option<NonlinearPart>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    nonlinear: Vec<NonlinearPart>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     interpolated: Vec<Interpolated>,
 }
@@ -77,7 +78,7 @@ impl From<Region> for StoredRegion {
             rivals: d.rivals,
             scatter: d.scatter,
             seen: d.seen,
-            nonlinear_part: d.nonlinear_part,
+            nonlinear: d.nonlinear,
             interpolated: d.interpolated,
         }
     }
@@ -102,7 +103,7 @@ impl TryFrom<StoredRegion> for Region {
         let fits = stored.chart.len() + stored.units.len() == stored.model.blocks.len()
             && (stored.chart.is_empty() || stored.units.is_empty())
             && seen
-            && stored.nonlinear_part.as_ref().is_none_or(|part| part.is_of(m))
+            && stored.nonlinear.iter().all(|part| part.is_of((p, m)))
             && stored.interpolated.iter().all(|of| of.is_of(p))
             && lists.into_iter().all(|list| positive(list))
             && is_of_loop(&stored.model, &stored.delays)
@@ -131,7 +132,7 @@ impl TryFrom<StoredRegion> for Region {
             scatter: stored.scatter,
             seen: None,
             of_another_form: Vec::new(),
-            nonlinear_part: stored.nonlinear_part,
+            nonlinear: stored.nonlinear,
             interpolated: stored.interpolated,
         };
         let directions = directions.with_seen(stored.seen);

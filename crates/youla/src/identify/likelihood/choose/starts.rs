@@ -24,7 +24,8 @@ const LONGEST_FUTURE: usize = 30;
 const WIDEST_PAST: usize = 1200;
 const WIDEST_FUTURE: usize = 600;
 const STEP_OF_WIDE: usize = 4;
-/// Relative ridges: rounding only, and what tames empty bands.
+/// Relative ridges: rounding only, and what tames empty bands. Of many channels the last alone: structures of 6 x 6 to 8 x 64 end at the same
+/// models, in three quarters of the time.
 const RIDGES: [f64; 2] = [1e-10, 1e-5];
 
 /// Regressions of several pasts and ridges.
@@ -144,7 +145,7 @@ impl Problem<'_> {
         let longest_future = if self.is_wide() { (WIDEST_FUTURE / p).max(2) } else { LONGEST_FUTURE };
         let mut states = Vec::new();
         for past in [longest / 6, longest / 2, longest].map(|past| past.max(3)) {
-            for ridge in RIDGES {
+            for ridge in RIDGES.into_iter().skip(usize::from(self.is_wide())) {
                 let shape = [past, past.min(LONGEST_FUTURE).min(longest_future), largest];
                 if let Some(found) = States::new(&sums, m, shape, ridge) {
                     states.push((format!("predictor of {past} samples, ridge {ridge:.0e}"), found));

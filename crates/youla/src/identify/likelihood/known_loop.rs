@@ -1,6 +1,8 @@
 //! What is known of the loop in which the records were taken.
 
 use crate::identify::likelihood::data::spectra::Sizes;
+use crate::identify::likelihood::search::feedthrough::Answer;
+use crate::identify::verdict::share_at_limit;
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, MatRef, Result};
@@ -64,13 +66,15 @@ impl<'a> LoopKnowledge<'a> {
         }
     }
 
-    /// K_d from y to u, m x p in units of the sizes: zero in open loop; `None` where the controller does not see all of y.
-    pub(crate) fn direct(&self, sizes: &Sizes) -> Option<Mat<f64>> {
+    /// What the controller answers to y in the same sample, in units of the sizes: nothing in open loop; `None` where the controller does not see
+    /// all of y.
+    pub(crate) fn direct(&self, sizes: &Sizes) -> Option<Answer> {
         let (m, p) = (sizes.u.len(), sizes.y.len());
-        let Some(k) = self.controller else { return Some(Mat::zeros(m, p)) };
+        let Some(k) = self.controller else { return Some(Answer { gain: Mat::zeros(m, p), share: 1.0 }) };
         // what it sees ends with y: y - r, or [u; y] for an observer
         let first = k.inputs().checked_sub(p)?;
-        (k.outputs() == m).then(|| Mat::from_fn(m, p, |j, i| k.d()[(j, first + i)] * sizes.y[i] / sizes.u[j]))
+        let gain = || Mat::from_fn(m, p, |j, i| k.d()[(j, first + i)] * sizes.y[i] / sizes.u[j]);
+        (k.outputs() == m).then(|| Answer { gain: gain(), share: 1.0 - share_at_limit(&self.estimation) })
     }
 }
 
@@ -87,4 +91,44 @@ fn check(controller: Option<&StateSpace<Discrete>>, record: &LoopSignals<'_>) ->
         check_finite("the excitation", x)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::likelihood::{Experiment, LikelihoodOptions, recommend};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// `u = clamp(d - 0.5 y)`, at its limits in a sixth of the samples: D, which is zero, is within three deviations (0.0045). With an answer
+    /// counted in every sample it is 0.044.
+    #[test]
+    fn an_input_at_its_limit_answers_nothing_in_the_same_sample() {
+        let (rows, rng) = (20_000, &mut ChaCha8Rng::seed_from_u64(4));
+        let mut normal = |size: f64| Mat::from_fn(rows, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+        let (d, mut y) = (normal(1.0), normal(0.6));
+        let (mut u, mut x) = (Mat::<f64>::zeros(rows, 1), 0.0);
+        for t in 0..rows {
+            y[(t, 0)] += x;
+            u[(t, 0)] = (d[(t, 0)] - 0.5 * y[(t, 0)]).clamp(-1.6, 1.6);
+            x = 0.9 * x + u[(t, 0)];
+        }
+        let time = Discrete::new(0.01).unwrap();
+        let k = StateSpace::gain(Mat::from_fn(1, 1, |_, _| -0.5), time).unwrap();
+        let explained = &u - &d;
+        let signals = LoopSignals {
+            seen: y.as_ref(),
+            explained: explained.as_ref(),
+            applied: u.as_ref(),
+            excitation: Some(d.as_ref()),
+        };
+        let known = LoopKnowledge::new(Some(&k), Some(&k), vec![signals], Vec::new()).unwrap();
+        let share = known.direct(&Sizes { u: vec![1.0], y: vec![1.0] }).unwrap().share;
+        assert!((0.8..0.88).contains(&share), "{share}");
+        let options = LikelihoodOptions { feedthrough: Some(true), ..Default::default() };
+        let records = [Experiment::new(u.as_ref(), y.as_ref())];
+        let found = recommend(&records, &[], Some(&known), time, &options).unwrap();
+        assert!(found.plant.d()[(0, 0)].abs() < 0.0135, "{}", found.plant.d()[(0, 0)]);
+    }
 }

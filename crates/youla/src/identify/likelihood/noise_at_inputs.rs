@@ -3,6 +3,7 @@
 use super::deviation::innovation::predictor;
 use super::search::autoregression::Regression;
 use super::search::chart::Chart;
+use super::search::feedthrough::Answer;
 use super::search::linearise::linearise;
 use super::search::model::Model;
 use super::search::noise::Noise;
@@ -349,7 +350,7 @@ fn the_predictor_after_a_search_has_the_filter_of_its_noise() {
         steps: 20,
         tolerance: 0.01,
         aim: f64::INFINITY,
-        direct: Mat::zeros(0, 0),
+        direct: Answer::unknown(),
         radius: f64::INFINITY,
         filter_moves: true,
     };

@@ -2,6 +2,7 @@
 
 use super::noise_at_inputs::{unscaled, whitener};
 use super::search::chart::Chart;
+use super::search::feedthrough::Answer;
 use super::search::free_gain::with_free_gain;
 use super::search::linearise::linearise_free;
 use super::search::model::Model;
@@ -40,7 +41,7 @@ fn record(seed: u64) -> Spectra {
 }
 
 fn options(noise_order: usize) -> SearchOptions {
-    let direct = Mat::zeros(0, 0);
+    let direct = Answer::unknown();
     let (aim, radius, steps) = (f64::INFINITY, f64::INFINITY, 20);
     SearchOptions { feedthrough: false, noise_order, steps, tolerance: 0.01, aim, direct, radius, filter_moves: true }
 }

@@ -314,6 +314,12 @@ fn residual(law: &StateSpace<Discrete>, gain: &Mat<f64>, r: &LoopSignals<'_>, li
     Residual { values, left_out }
 }
 
+/// Share of the samples of some records in which an input is at a limit.
+pub(crate) fn share_at_limit(records: &[LoopSignals<'_>]) -> f64 {
+    let limited: Vec<bool> = records.iter().flat_map(at_limit).collect();
+    limited.iter().filter(|limited| **limited).count() as f64 / limited.len().max(1) as f64
+}
+
 /// Samples in which an input is at its largest or least value, where it is so several times in a record.
 fn at_limit(r: &LoopSignals<'_>) -> Vec<bool> {
     let mut out = vec![false; r.applied.nrows()];

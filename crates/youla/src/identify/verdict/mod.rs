@@ -27,7 +27,7 @@ mod parts;
 mod tests;
 mod witness;
 
-pub(crate) use controller::explains;
+pub(crate) use controller::{explains, share_at_limit};
 pub(crate) use excess::Excess;
 pub use loop_ratio::LoopRatio;
 pub(crate) use nonlinear::{NonlinearPart, nonlinear};

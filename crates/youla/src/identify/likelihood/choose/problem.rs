@@ -5,6 +5,7 @@ use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
 use crate::identify::likelihood::deviation::physical;
+use crate::identify::likelihood::search::feedthrough::Answer;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{Found, SearchOptions, on_groups, search};
@@ -122,9 +123,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) skip: usize,
     /// Whether D moves.
     pub(crate) feedthrough: bool,
-    /// Whether D may be chosen by the evidence, and the answer of the controller in the same sample, m x p in units of the sizes:
-    /// D is not told from the noise without it.
-    pub(crate) direct: Option<Mat<f64>>,
+    /// Whether D may be chosen by the evidence, and what the controller answers in the same sample, in units of the sizes: D is not told from
+    /// the noise without it.
+    pub(crate) direct: Option<Answer>,
     /// Whether the records are of an open loop, in which nothing unstable stays within bounds.
     pub(crate) open_loop: bool,
     /// The order where it is given.
@@ -160,9 +161,11 @@ impl Problem<'_> {
     /// Options of a search.
     pub(crate) fn options(&self, steps: usize, tolerance: f64, delays: &[usize]) -> SearchOptions {
         let (m, p) = (self.inputs(), self.outputs());
-        let known = self.direct.as_ref();
-        let direct = known
-            .map_or_else(Mat::new, |known| Mat::from_fn(m, p, |j, i| if delays[j] == 0 { known[(j, i)] } else { 0.0 }));
+        let at_once = |known: &Answer| Answer {
+            gain: Mat::from_fn(m, p, |j, i| if delays[j] == 0 { known.gain[(j, i)] } else { 0.0 }),
+            ..*known
+        };
+        let direct = self.direct.as_ref().map_or_else(Answer::unknown, at_once);
         let radius = if self.open_loop { 1.0 + GROWTH / self.samples().0 as f64 } else { f64::INFINITY };
         let aim = f64::INFINITY;
         SearchOptions {

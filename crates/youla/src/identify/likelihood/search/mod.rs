@@ -35,6 +35,7 @@ use by_output::{Ends, Normal};
 use chart::Chart;
 use driven::has_line;
 use faer::Mat;
+use feedthrough::Answer;
 use groups::grouped;
 use linearise::{Filter, Linearised, linearise_quickly};
 use model::Model;
@@ -55,8 +56,8 @@ pub(crate) struct SearchOptions {
     pub(crate) tolerance: f64,
     /// Criterion to be undercut: a search that its steps will not bring there is given up.
     pub(crate) aim: f64,
-    /// K_d, the answer of the controller in the same sample, m x p; without entries where it is not known.
-    pub(crate) direct: Mat<f64>,
+    /// What the controller answers in the same sample.
+    pub(crate) direct: Answer,
     /// Largest magnitude of a pole.
     pub(crate) radius: f64,
     /// Whether steps count what the plant of one output does to the spectrum of noise at its inputs.

@@ -11,7 +11,7 @@ use rustfft::{Fft, FftPlanner};
 /// A function of an input in units of its size, or of the velocity that it causes.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
-    /// Of an output that is a position. The two kinds of friction are first, so that what stands behind them is what friction does not explain.
+    /// Of an output that is a position. The two kinds of friction come first, so that the rest is what friction does not explain.
     Friction,
     /// Of an output that is a velocity.
     FrictionAtSpeed,
@@ -76,7 +76,7 @@ pub(super) struct Shaped {
     /// Lines of the functions, those of one after the other.
     pub(super) plain: Vec<Vec<c64>>,
     /// The output that each input moves most.
-    pub(super) seen: Vec<usize>,
+    pub(super) moved_most: Vec<usize>,
 }
 
 /// The functions of one record seen through the model, lines x p x functions.
@@ -141,7 +141,7 @@ pub(super) fn columns(
             plain[f] = of_shape;
         }
     }
-    Shaped { columns, sizes, plain, seen: moved_most }
+    Shaped { columns, sizes, plain, moved_most }
 }
 
 /// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.

@@ -36,6 +36,15 @@ enum Channel {
     Output(usize),
 }
 
+impl Channel {
+    /// Its place among the inputs or among the outputs.
+    fn place(self) -> usize {
+        match self {
+            Channel::Input(place) | Channel::Output(place) => place,
+        }
+    }
+}
+
 /// What acts at an input, or at an output, and is no linear function of it, over frequency.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -46,15 +55,16 @@ pub(crate) struct NonlinearPart {
 }
 
 impl NonlinearPart {
-    /// Bands of 40 lines: of `c f` what no response to the channel gives. `parts` holds for each record the lines of f and of the channel.
-    fn new<'a>(channel: Channel, c: f64, parts: impl Iterator<Item = (&'a [c64], Vec<c64>)> + Clone) -> Self {
-        let lines = parts.clone().map(|(f, _)| f.len()).min().unwrap_or(0);
+    /// Bands of 40 lines: of `c f` what no response to the channel gives. `parts` holds for each record the lines of f and those of all inputs or
+    /// outputs, of which there are `channels`.
+    fn new(channel: Channel, c: f64, parts: &[(&[c64], &[c64])], channels: usize) -> Self {
+        let lines = parts.iter().map(|(f, _)| f.len()).min().unwrap_or(0);
         let count = (lines / BAND_LINES).max(1);
         let mut sums = vec![(0.0, c64::ZERO, 0.0); count];
         for (f, x) in parts {
             let total = f.len();
-            for (k, (f, x)) in f.iter().zip(x).enumerate() {
-                let sum = &mut sums[(k * count / total).min(count - 1)];
+            for (k, f) in f.iter().enumerate() {
+                let (sum, x) = (&mut sums[(k * count / total).min(count - 1)], x[k * channels + channel.place()]);
                 *sum = (sum.0 + f.norm_sqr(), sum.1 + f * x.conj(), sum.2 + x.norm_sqr());
             }
         }
@@ -67,11 +77,11 @@ impl NonlinearPart {
     /// Whether it is that of a plant with so many outputs and inputs.
     #[cfg(feature = "serde")]
     pub(crate) fn is_of(&self, (outputs, inputs): (usize, usize)) -> bool {
-        let within = match self.channel {
-            Channel::Input(input) => input < inputs,
-            Channel::Output(output) => output < outputs,
+        let channels = match self.channel {
+            Channel::Input(_) => inputs,
+            Channel::Output(_) => outputs,
         };
-        within && !self.bands.is_empty()
+        self.channel.place() < channels && !self.bands.is_empty()
     }
 
     /// Adds the mean square of the error of the response that stays of it at a frequency, a share of the sample rate, to those of the entries
@@ -231,22 +241,16 @@ impl<'a> Beside<'a> {
     /// What a function with its coefficient adds to its channel.
     fn part(&self, f: usize, c: f64) -> NonlinearPart {
         let (m, p) = (self.spectra.inputs, self.spectra.outputs);
-        let input = f % m;
-        let lines = |shaped: &Shaped| match f < self.at_inputs().end {
-            true => Channel::Input(input),
-            false => Channel::Output(shaped.seen[input]),
+        let (channel, channels) = match self.records.first() {
+            Some(shaped) if !self.at_inputs().contains(&f) => (Channel::Output(shaped.moved_most[f % m]), p),
+            _ => (Channel::Input(f % m), m),
         };
-        let channel = self.records.first().map_or(Channel::Input(input), lines);
-        let of_channel = move |(record, clean): (usize, &Vec<c64>)| -> Vec<c64> {
-            match channel {
-                Channel::Input(input) => {
-                    self.spectra.records[record].u.iter().skip(input).step_by(m).copied().collect()
-                }
-                Channel::Output(output) => clean.iter().skip(output).step_by(p).copied().collect(),
-            }
-        };
-        let channels = self.clean.iter().enumerate().map(of_channel);
-        NonlinearPart::new(channel, c, self.records.iter().map(|shaped| shaped.plain[f].as_slice()).zip(channels))
+        let all = self.spectra.records.iter().zip(&self.clean).map(|(lines, clean)| match channel {
+            Channel::Input(_) => &lines.u[..],
+            Channel::Output(_) => &clean[..],
+        });
+        let parts: Vec<(&[c64], &[c64])> = self.records.iter().map(|shaped| &shaped.plain[f][..]).zip(all).collect();
+        NonlinearPart::new(channel, c, &parts, channels)
     }
 }
 

@@ -271,7 +271,7 @@ fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
     assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
 }
 
-/// Friction against the sign of an output that is a velocity is told from that of a position, and by 2 % of the size of the input.
+/// Friction against the sign of an output that is a velocity is named as such, with 1 to 5 % of the input.
 #[test]
 fn dry_friction_of_a_speed_is_named_and_widens_the_region() {
     let found = with(&Fault { drag: 0.08, noise: 0.02, ..NONE });

@@ -14,7 +14,7 @@ use std::ops::Range;
 /// Largest mean square of `d(k + q) - d(k)` at a period, relative to the variance of d: 15 bits of resolution pass.
 const REPEATED: f64 = 1e-9;
 
-/// Rows in which a shift is compared first, and the part of a turn that spreads them over the record, which no period shares.
+/// Rows in which a shift is compared first, and the golden section, whose multiples spread them evenly over the record.
 const COMPARED: usize = 256;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 

@@ -123,8 +123,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) skip: usize,
     /// Whether D moves.
     pub(crate) feedthrough: bool,
-    /// Whether D may be chosen by the evidence, and what the controller answers in the same sample, in units of the sizes: D is not told from
-    /// the noise without it.
+    /// Whether D may be chosen by the evidence, and what the controller answers in the same sample, in units of the sizes: without it D
+    /// cannot be distinguished from the noise.
     pub(crate) direct: Option<Answer>,
     /// Whether the records are of an open loop, in which nothing unstable stays within bounds.
     pub(crate) open_loop: bool,

@@ -143,9 +143,10 @@ impl Problem<'_> {
         let sums = LagSums::new(self.experiments, &self.sizes, delays, longest);
         let largest = self.largest_start();
         let longest_future = if self.is_wide() { (WIDEST_FUTURE / p).max(2) } else { LONGEST_FUTURE };
+        let ridges = if self.is_wide() { &RIDGES[1..] } else { &RIDGES };
         let mut states = Vec::new();
         for past in [longest / 6, longest / 2, longest].map(|past| past.max(3)) {
-            for ridge in RIDGES.into_iter().skip(usize::from(self.is_wide())) {
+            for ridge in ridges.iter().copied() {
                 let shape = [past, past.min(LONGEST_FUTURE).min(longest_future), largest];
                 if let Some(found) = States::new(&sums, m, shape, ridge) {
                     states.push((format!("predictor of {past} samples, ridge {ridge:.0e}"), found));

@@ -4,3 +4,4 @@ mod arrows;
 mod circles;
 mod documents;
 mod files;
+mod names;

@@ -6,10 +6,10 @@ use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionMethod, ReductionOptions, reduce, reduce_in_loop};
 use youla::validate::certify;
 use youla_run::{Identification, StageClock, identify};
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 fn identified(seed: u64) -> Identification {
-    let mut demo = demo(Machine::Bearing, seed).unwrap();
+    let mut demo = demo(DemoMachine::Bearing, seed).unwrap();
     demo.settings.reduction = None;
     demo.settings.direct = None;
     identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut |_| ())).unwrap()

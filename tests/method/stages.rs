@@ -2,10 +2,10 @@
 
 use std::path::Path;
 use youla_run::{Identification, Method, StageClock, identify};
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 fn run_demo(seed: u64) -> Identification {
-    let demo = demo(Machine::Bearing, seed).unwrap();
+    let demo = demo(DemoMachine::Bearing, seed).unwrap();
     let mut silent = |_| ();
     identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap()
 }
@@ -77,7 +77,7 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     use youla_greybox::{Declaration, Template};
     use youla_run::GreyBoxSettings;
     use youla_twin::BearingStructure;
-    let mut demo = demo(Machine::Bearing, 2).unwrap();
+    let mut demo = demo(DemoMachine::Bearing, 2).unwrap();
     let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };
     demo.settings.grey_box = Some(GreyBoxSettings { start_from_initial: false, ..GreyBoxSettings::new(structure) });
     let mut silent = |_| ();

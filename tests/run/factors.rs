@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use youla_run::{ControllerSettings, Feedback, RunSettings, declared_loop, factorise_run};
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.
 fn grid_to_nyquist(ts: f64, count: usize) -> Vec<f64> {
@@ -12,7 +12,7 @@ fn grid_to_nyquist(ts: f64, count: usize) -> Vec<f64> {
 /// States that span 1e6 (um, um/s, V) cost no digits of (15), because they are scaled first.
 #[test]
 fn states_are_scaled_before_factorising() {
-    let demo = demo(Machine::Bearing, 1).unwrap();
+    let demo = demo(DemoMachine::Bearing, 1).unwrap();
     let found = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
     assert!(found.bezout_residual < 1e-13, "{:.1e}", found.bezout_residual);
     let declared = declared_loop(&demo.settings, &demo.records, Path::new(".")).unwrap();
@@ -22,7 +22,7 @@ fn states_are_scaled_before_factorising() {
 /// One controller written down in three ways gives the same loop: observer gains, and its matrices with either sign.
 #[test]
 fn forms_and_signs_of_one_controller_agree() {
-    let demo = demo(Machine::Bearing, 1).unwrap();
+    let demo = demo(DemoMachine::Bearing, 1).unwrap();
     let observer = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
     let k = &observer.factors.controller().unwrap();
     let rows = |m: youla::MatRef<'_, f64>, sign: f64| -> Vec<Vec<f64>> {

@@ -13,7 +13,7 @@ use youla::{Error, Mat, MatRef};
 use youla_rt::{Controller, Real, State};
 use youla_run::ControllerSettings;
 use youla_twin::rig::{Bearing, degraded};
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 const SAMPLES: usize = 1_000_000;
 const EXACT: f64 = 1e-12;
@@ -47,7 +47,7 @@ impl Loop {
         let time = Discrete::new(TS).unwrap();
         let bearing = Bearing::default().plant().unwrap();
         let ControllerSettings::Observer { state_feedback, observer_gain, .. } =
-            demo(Machine::Bearing, 1).unwrap().settings.controller
+            demo(DemoMachine::Bearing, 1).unwrap().settings.controller
         else {
             panic!("the demonstration has an observer-based controller")
         };

@@ -18,7 +18,7 @@ use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
 use youla_loop::redesign::{Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
 use youla_twin::rig::{
-    Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, Rig, RigParameters,
+    Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, RigParameters, SimulatedRig,
     bearing_at_speed, degraded, run_experiment,
 };
 

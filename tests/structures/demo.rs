@@ -3,13 +3,13 @@
 use youla::identify::subspace::InitialState;
 use youla_greybox::{GreyBoxOptions, Problem, Stop, greybox};
 use youla_twin::rig::Bearing;
-use youla_twin::{BearingStructure, Machine, demo};
+use youla_twin::{BearingStructure, DemoMachine, demo};
 
 /// The demonstration: closed loop, start with every entry of A halved. The fit of the truth is that of the noise alone; the
 /// search must end at a point no worse than its start, and say where.
 #[test]
 fn a_nominal_model_that_is_half_wrong() {
-    let records = demo(Machine::Bearing, 1).unwrap().records;
+    let records = demo(DemoMachine::Bearing, 1).unwrap().records;
     let fit_from = |start: &Bearing| {
         let start = BearingStructure::parameters(start);
         greybox(

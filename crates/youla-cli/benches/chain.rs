@@ -24,7 +24,7 @@ use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
 use youla::signal::{Excitation, SquareWaves};
 use youla_run::{StageClock, identify, write_run};
 use youla_twin::rig::Bearing;
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 /// Errors of all crates.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
@@ -257,7 +257,7 @@ fn demonstration() -> Result<()> {
     for _ in 0..11 {
         let mut quiet = |_| ();
         let mut clock = StageClock::new(&mut quiet);
-        let demo = demo(Machine::Bearing, 1)?;
+        let demo = demo(DemoMachine::Bearing, 1)?;
         let found = identify(demo.settings, demo.records, Path::new("."), &mut clock)?;
         write_run(&found, &folder, folder.exists(), &mut clock)?;
         runs.push(clock.seconds);

@@ -4,7 +4,7 @@
 
 use std::hint::black_box;
 use std::time::Instant;
-use youla_twin::rig::{BearingRig, Fidelity, Rig, RigParameters};
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters, SimulatedRig};
 
 /// Errors of all crates.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;

@@ -18,7 +18,7 @@ use std::path::Path;
 use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
 use youla::lti::{Discrete, StateSpace, frequency_response};
-use youla_report::data::{Method, Role};
+use youla_report::data::{DrawnMethod, MethodRole};
 use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Panel};
 use youla_report::{figure_csv, svg};
 
@@ -138,10 +138,10 @@ fn draw(folder: &Path) -> Result<()> {
     let rows: Vec<Vec<&str>> =
         text.lines().map(|l| l.split(',').collect::<Vec<_>>()).filter(|r| r[0] != "loop").collect();
     let methods = [
-        Method::new("youla", "youla, no key", Role::Hansen),
-        Method::new("expert", "PBSIDopt, true order", Role::Pem),
-        Method::new("slicot", "SLICOT N4SID, true order", Role::Direct),
-        Method::new("sippy", "SIPPY N4SID, true order", Role::Nominal),
+        DrawnMethod::new("youla", "youla, no key", MethodRole::Hansen),
+        DrawnMethod::new("expert", "PBSIDopt, true order", MethodRole::Pem),
+        DrawnMethod::new("slicot", "SLICOT N4SID, true order", MethodRole::Direct),
+        DrawnMethod::new("sippy", "SIPPY N4SID, true order", MethodRole::Nominal),
     ];
     let systems = loops()?;
     let (mut curves, mut table) = (Vec::new(), String::new());
@@ -164,7 +164,7 @@ fn draw(folder: &Path) -> Result<()> {
     println!("{table}");
     let bounds: Vec<f64> = rows.iter().map(|r| Ok(r[3].parse()?)).collect::<Result<_>>()?;
     let ends = vec![bounds.iter().copied().fold(f64::INFINITY, f64::min), bounds.iter().copied().fold(0.0, f64::max)];
-    let least = Method::new("bound", "bound", Role::Other);
+    let least = DrawnMethod::new("bound", "bound", MethodRole::Other);
     curves.push(Curve { method: least.key.clone(), x: ends.clone(), y: ends, ..Curve::default() });
     let methods = [&methods[..], &[least]].concat();
     let axis = |label: &str| Axis { label: label.into(), log: true, ..Axis::default() };

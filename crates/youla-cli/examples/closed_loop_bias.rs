@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use youla::Mat;
 use youla::identify::subspace::SubspaceMethod;
-use youla_report::data::{Method, Role};
+use youla_report::data::{DrawnMethod, MethodRole};
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 use youla_report::{figure_csv, svg};
 
@@ -26,11 +26,11 @@ const SEEDS: u64 = 9;
 
 fn main() -> Result<()> {
     let methods = [
-        Method::new("n4sid", "N4SID direct", Role::Direct),
-        Method::new("pbsid-opt", "PBSIDopt, p = 100", Role::HansenReduced),
-        Method::new("ssarx", "SSARX, p = 100", Role::Pem),
-        Method::new("hansen", "Hansen G(S)", Role::Hansen),
-        Method::new("rate", "1/sqrt(N)", Role::Nominal),
+        DrawnMethod::new("n4sid", "N4SID direct", MethodRole::Direct),
+        DrawnMethod::new("pbsid-opt", "PBSIDopt, p = 100", MethodRole::HansenReduced),
+        DrawnMethod::new("ssarx", "SSARX, p = 100", MethodRole::Pem),
+        DrawnMethod::new("hansen", "Hansen G(S)", MethodRole::Hansen),
+        DrawnMethod::new("rate", "1/sqrt(N)", MethodRole::Nominal),
     ];
     let bearing = Loop::new(0.0);
     let estimate = |method: &str, (u, y): &(Mat<f64>, Mat<f64>)| match method {
@@ -59,7 +59,7 @@ fn main() -> Result<()> {
     }
     let x = SAMPLES.map(|samples| samples as f64).to_vec();
     let curve =
-        |method: &Method, y: Vec<f64>| Curve { method: method.key.clone(), x: x.clone(), y, ..Curve::default() };
+        |method: &DrawnMethod, y: Vec<f64>| Curve { method: method.key.clone(), x: x.clone(), y, ..Curve::default() };
     let mut curves: Vec<Curve> = estimated.iter().zip(errors).map(|(method, errors)| curve(method, errors)).collect();
     curves.push(curve(&methods[4], x.iter().map(|n| 0.15 * (16_000.0 / n).sqrt()).collect()));
     let axis = |label: &str| Axis { label: label.into(), log: true, ..Axis::default() };

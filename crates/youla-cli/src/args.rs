@@ -156,11 +156,11 @@ pub(crate) enum Machine {
     Bearing,
 }
 
-impl From<Machine> for youla_twin::Machine {
+impl From<Machine> for youla_twin::DemoMachine {
     fn from(machine: Machine) -> Self {
         match machine {
-            Machine::Levitation => youla_twin::Machine::Levitation,
-            Machine::Bearing => youla_twin::Machine::Bearing,
+            Machine::Levitation => youla_twin::DemoMachine::Levitation,
+            Machine::Bearing => youla_twin::DemoMachine::Bearing,
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::table;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
-use youla_paper::study::{Method, PaperSettings, Shard};
+use youla_paper::study::{PaperSettings, Shard, StudyMethod};
 use youla_twin::rig::RigParameters;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -35,7 +35,7 @@ pub(crate) struct PaperArgs {
     models: Option<usize>,
     /// Methods that study and map compare, separated by commas.
     #[arg(long, value_delimiter = ',', value_parser = method)]
-    methods: Option<Vec<Method>>,
+    methods: Option<Vec<StudyMethod>>,
     /// Speed of the first experiment.
     #[arg(long, allow_negative_numbers = true)]
     rpm: Option<f64>,
@@ -68,9 +68,9 @@ pub(crate) enum StudyCommand {
     },
 }
 
-fn method(name: &str) -> Result<Method, String> {
-    let known: Vec<&str> = Method::ALL.iter().map(|method| method.key()).collect();
-    Method::of_key(name).ok_or_else(|| format!("there is no such method; known are {}", known.join(", ")))
+fn method(name: &str) -> Result<StudyMethod, String> {
+    let known: Vec<&str> = StudyMethod::ALL.iter().map(|method| method.key()).collect();
+    StudyMethod::of_key(name).ok_or_else(|| format!("there is no such method; known are {}", known.join(", ")))
 }
 
 /// Reproduces the paper, or its part.

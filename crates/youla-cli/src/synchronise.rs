@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
 use youla::signal::Channel;
 use youla_io::folder::require_place;
-use youla_io::{ChannelRef, Placement, Role, StampedChannel, StampedColumn, Synchronised, require_free};
+use youla_io::{ChannelRef, ChannelRole, Placement, StampedChannel, StampedColumn, Synchronised, require_free};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -85,10 +85,10 @@ pub(crate) fn synchronise(form: Form, args: &SynchroniseArgs) -> Result<(), Fail
     let time = Discrete::new(args.sample_time)?;
     let columns = read(args)?;
     let chosen = [
-        (Role::Input, &args.input),
-        (Role::Output, &args.output),
-        (Role::External, &args.excitation),
-        (Role::External, &args.reference),
+        (ChannelRole::Input, &args.input),
+        (ChannelRole::Output, &args.output),
+        (ChannelRole::External, &args.excitation),
+        (ChannelRole::External, &args.reference),
     ];
     let mut channels = Vec::new();
     for (role, names) in chosen {
@@ -131,7 +131,7 @@ fn read(args: &SynchroniseArgs) -> Result<Vec<(String, StampedColumn)>, Failure>
 
 fn channel(
     name: &str,
-    role: Role,
+    role: ChannelRole,
     columns: &[(String, StampedColumn)],
     args: &SynchroniseArgs,
 ) -> Result<StampedChannel, Failure> {

@@ -6,7 +6,7 @@ use youla::error::short;
 use youla::identify::likelihood::figure;
 use youla_loop::redesign::structured::PidController;
 use youla_paper::run::WrittenPaper;
-use youla_paper::study::{Method, Paper, StudyExperiment};
+use youla_paper::study::{Paper, StudyExperiment, StudyMethod};
 use youla_report::numbers::fit;
 use youla_run::{Identification, ModelValidation, WrittenRun, cautions};
 
@@ -56,7 +56,7 @@ pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
     let mut rows = vec![std::iter::once("Table 1: fit (26), percent, H and V".to_owned()).chain(titles).collect()];
     for (k, method) in experiments.first().into_iter().flat_map(|e| &e.models).map(|m| m.method).enumerate() {
         rows.push(row(method.label(), &|e| e.models[k].fit));
-        let published = [Method::Nominal, Method::Pem, Method::Hansen, Method::HansenReduced];
+        let published = [StudyMethod::Nominal, StudyMethod::Pem, StudyMethod::Hansen, StudyMethod::HansenReduced];
         if let Some(place) = published.iter().position(|m| *m == method) {
             rows.push(row("  in the paper", &|e| e.case.published[place]));
         }

@@ -8,7 +8,7 @@ use std::path::Path;
 use youla_link::{LARGEST_CHUNK, Request};
 use youla_rt::{Checksum, Trip};
 use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
-use youla_twin::{LockStep, LogRow, Q_STATES, RunningLoop, Target};
+use youla_twin::{LockStep, LoggedValues, Q_STATES, RunningLoop, Target};
 
 /// Samples of the ramp of an excitation.
 pub(crate) const RAMP: u16 = 500;
@@ -99,7 +99,7 @@ impl Bench {
     }
 
     /// The rows since the last call.
-    pub(crate) fn take_rows(&mut self) -> Vec<LogRow> {
+    pub(crate) fn take_rows(&mut self) -> Vec<LoggedValues> {
         match self {
             Bench::Twin(twin) => twin.take_rows(),
             Bench::Link(link) => link.take_rows(),

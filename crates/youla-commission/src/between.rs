@@ -8,13 +8,14 @@ use crate::parameter::{LoadedQ, loaded};
 use crate::point::{FIRST, Operator, Point};
 use crate::q_table::{point_q, point_s};
 use crate::record::{
-    BetweenRecord, Evidence, PointRecord, PointStatus, io, log_text, read_json, way_name, write_json, write_text,
+    BetweenRecord, PointRecord, PointStatus, ScheduleEvidence, io, log_text, read_json, way_name, write_json,
+    write_text,
 };
 use crate::{Error, Result};
 use std::fs;
 use std::path::Path;
 use youla_loop::schedule::{BetweenPoints, between_points, q_between};
-use youla_twin::{LogRow, RunningLoop};
+use youla_twin::{LoggedValues, RunningLoop};
 
 /// Points next to each other in speed, with the same running loop and the same film: places in the campaign.
 pub(crate) fn pairs(campaign: &Campaign, loops: &[RunningLoop]) -> Vec<[usize; 2]> {
@@ -85,7 +86,7 @@ fn examined(
     ends: &Ends<'_>,
     (out, image): (&Path, Option<&Path>),
     operator: &mut dyn Operator,
-) -> Result<(BetweenRecord, Vec<LogRow>)> {
+) -> Result<(BetweenRecord, Vec<LoggedValues>)> {
     let halfway = OperatingPoint {
         name: way_name(&ends.at[0].name, &ends.at[1].name),
         rpm: 0.5 * (ends.at[0].rpm + ends.at[1].rpm),
@@ -129,7 +130,8 @@ fn evidence(ends: &Ends<'_>, out: &Path, record: &mut BetweenRecord) -> Result<L
     let halfway = q_between(q, 0.5, ends.running.q_states)?;
     let BetweenPoints { gain, room, change, q_room, .. } = found;
     let region = |i: usize| ends.records[i].region.unwrap_or(f64::INFINITY);
-    let figures = Evidence { gain, room, change, region: region(0).max(region(1)), q_room, q_error: halfway.error };
+    let figures =
+        ScheduleEvidence { gain, room, change, region: region(0).max(region(1)), q_room, q_error: halfway.error };
     record.evidence = Some(figures);
     record.q_order = Some(halfway.q.order());
     if !figures.holds() {
@@ -147,7 +149,7 @@ fn checked(
     campaign: &Campaign,
     (ends, halfway, bench, q): (&Ends<'_>, &OperatingPoint, Bench, &LoadedQ),
     operator: &mut dyn Operator,
-    (record, rows): (&mut BetweenRecord, &mut Vec<LogRow>),
+    (record, rows): (&mut BetweenRecord, &mut Vec<LoggedValues>),
 ) -> Result<()> {
     let mut point = Point::new(campaign, halfway, ends.running, bench);
     point.record.amplitude = ends.records[0].amplitude.min(ends.records[1].amplitude);
@@ -174,7 +176,7 @@ fn reached(
     point: &mut Point<'_>,
     q: &LoadedQ,
     expected: f64,
-    (record, rows): (&mut BetweenRecord, &mut Vec<LogRow>),
+    (record, rows): (&mut BetweenRecord, &mut Vec<LoggedValues>),
 ) -> Result<()> {
     let switched = point.switched(q).and_then(|log| {
         *rows = log;

@@ -9,7 +9,7 @@ use youla::signal::{Channel, LoopRecord, without_harmonics};
 use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec};
 use youla_run::{DataFile, DataSettings, Identification, RunRecords, RunSettings, SourceFile, StageClock, identify};
-use youla_twin::{LogRow, RunningLoop};
+use youla_twin::{LoggedValues, RunningLoop};
 
 /// Rows of one experiment without the harmonics of the speed.
 pub(crate) struct CleanRows {
@@ -22,7 +22,7 @@ pub(crate) struct CleanRows {
 const HARMONICS: usize = 5;
 
 impl CleanRows {
-    pub(crate) fn new(rows: &[LogRow], rpm: f64, time: Discrete) -> Result<Self> {
+    pub(crate) fn new(rows: &[LoggedValues], rpm: f64, time: Discrete) -> Result<Self> {
         let signal = |first: usize| Mat::from_fn(rows.len(), 2, |i, j| rows[i][first + j]);
         let clean = |m: Mat<f64>| -> Result<Mat<f64>> {
             let harmonics = if rpm > 0.0 { HARMONICS } else { 0 };

@@ -26,8 +26,8 @@ pub use error::{Error, Result};
 pub use figures::LoopState;
 pub use point::Operator;
 pub use q_table::{QAtSpeed, QTable};
-pub use record::{BetweenRecord, CampaignSummary, DampingFigures, Evidence, PointRecord, PointStatus};
-pub use rehearse::{LEVEL, Prediction};
+pub use record::{BetweenRecord, CampaignSummary, DampingFigures, PointRecord, PointStatus, ScheduleEvidence};
+pub use rehearse::{DampingPrediction, LEVEL};
 
 #[cfg(test)]
 mod tests;

@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use youla_link::{LARGEST_CHUNK, Request};
-use youla_rig::{LogRow as RigRow, Recorder, Rig, RowSink};
+use youla_rig::{LogRow, Recorder, Rig, RowSink};
 use youla_rt::{Phase, Status, Trip};
-use youla_twin::LogRow;
+use youla_twin::LoggedValues;
 
 /// Time between two signs of life.
 const BEAT: Duration = Duration::from_millis(100);
@@ -22,7 +22,7 @@ const GONE: Duration = Duration::from_secs(5);
 /// What the thread hands over.
 #[derive(Default)]
 struct Shared {
-    rows: Vec<LogRow>,
+    rows: Vec<LoggedValues>,
     status: Option<Status>,
     missing: u64,
     /// Rows are waited for.
@@ -107,7 +107,7 @@ impl Link {
         ended
     }
 
-    fn beyond(&self, row: &LogRow) -> Option<String> {
+    fn beyond(&self, row: &LoggedValues) -> Option<String> {
         let signals = [("y", 0, self.limits[0]), ("u", 2, self.limits[1]), ("beta", 6, self.limits[2])];
         signals.into_iter().find_map(|(name, first, limit)| {
             let channel = (0..2).find(|i| row[first + i].is_nan() || row[first + i].abs() > limit)?;
@@ -129,7 +129,7 @@ impl Link {
         if sent { answer.recv().map_err(|_| gone())? } else { Err(gone()) }
     }
 
-    pub(crate) fn take_rows(&mut self) -> Vec<LogRow> {
+    pub(crate) fn take_rows(&mut self) -> Vec<LoggedValues> {
         std::mem::take(&mut locked(&self.shared).rows)
     }
 
@@ -161,7 +161,7 @@ fn locked(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
 struct Rows(Arc<Mutex<Shared>>);
 
 impl RowSink for Rows {
-    fn take(&mut self, row: &RigRow<'_>) -> std::io::Result<()> {
+    fn take(&mut self, row: &LogRow<'_>) -> std::io::Result<()> {
         let mut values = [0.0; 8];
         values.iter_mut().zip(row.values).for_each(|(place, value)| *place = (*value).into());
         let mut shared = locked(&self.0);

@@ -11,9 +11,9 @@ use crate::record::{PointRecord, PointStatus};
 use crate::{Error, Result};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-use youla_link::{Request, Source};
+use youla_link::{Request, SequenceOrigin};
 use youla_run::Identification;
-use youla_twin::{LogRow, RunningLoop};
+use youla_twin::{LoggedValues, RunningLoop};
 
 /// Seconds without excitation before and after each step: transients of the loop decay.
 const REST: f64 = 1.0;
@@ -52,8 +52,8 @@ pub(crate) struct Point<'a> {
 pub(crate) struct PointFiles {
     pub(crate) found: Option<Box<Identification>>,
     pub(crate) proposal: Option<Box<Proposal>>,
-    pub(crate) log: Vec<LogRow>,
-    pub(crate) verification: Vec<LogRow>,
+    pub(crate) log: Vec<LoggedValues>,
+    pub(crate) verification: Vec<LoggedValues>,
 }
 
 impl<'a> Point<'a> {
@@ -139,7 +139,7 @@ impl<'a> Point<'a> {
     }
 
     /// Switches and compares the verification with its prediction.
-    pub(crate) fn verified(&mut self, proposal: &Proposal, verification: &mut Vec<LogRow>) -> Result<()> {
+    pub(crate) fn verified(&mut self, proposal: &Proposal, verification: &mut Vec<LoggedValues>) -> Result<()> {
         *verification = match self.switched(&proposal.new.q) {
             Err(Error::Refused { reason }) => return self.fall_back(reason, true),
             other => other?,
@@ -221,7 +221,7 @@ impl<'a> Point<'a> {
     }
 
     /// Whether the residuals of the machine are those of the loop that its file states.
-    fn runs_the_loop(&self, rows: &[LogRow]) -> Result<()> {
+    fn runs_the_loop(&self, rows: &[LoggedValues]) -> Result<()> {
         let signal = |first: usize| Mat::from_fn(rows.len(), 2, |i, j| rows[i][first + j]);
         let (y, u, beta) = (signal(0), signal(2), signal(6));
         let signals = self.running.factors.signals(u.as_ref(), y.as_ref())?;
@@ -240,16 +240,16 @@ impl<'a> Point<'a> {
     }
 
     /// Arms, starts and runs over the ramp, then records.
-    fn excited(&mut self, amplitude: f64, samples: usize) -> Result<Vec<LogRow>> {
+    fn excited(&mut self, amplitude: f64, samples: usize) -> Result<Vec<LoggedValues>> {
         self.bench.ask(&Request::Arm)?;
-        let source = Source::Prbs { order: ORDER, hold: self.samples(HOLD) as u16 };
+        let source = SequenceOrigin::Prbs { order: ORDER, hold: self.samples(HOLD) as u16 };
         self.bench.ask(&Request::Start { source, amplitude: amplitude as f32 })?;
         self.bench.excite(RAMP.into())?;
         self.bench.take_rows();
         self.recorded_rows(samples)
     }
 
-    fn recorded_rows(&mut self, samples: usize) -> Result<Vec<LogRow>> {
+    fn recorded_rows(&mut self, samples: usize) -> Result<Vec<LoggedValues>> {
         self.bench.excite(samples)?;
         match self.bench.trip() {
             None => Ok(self.bench.take_rows()),
@@ -292,7 +292,7 @@ impl<'a> Point<'a> {
     }
 
     /// Loads and switches, rests, and records the verification.
-    pub(crate) fn switched(&mut self, q: &LoadedQ) -> Result<Vec<LogRow>> {
+    pub(crate) fn switched(&mut self, q: &LoadedQ) -> Result<Vec<LoggedValues>> {
         self.bench.load(q)?;
         self.bench.ask(&Request::Arm)?;
         self.bench.ask(&Request::SwitchQ)?;
@@ -313,14 +313,14 @@ impl<'a> Point<'a> {
         q: &LoadedQ,
         controller: &StateSpace<Discrete>,
         sizes: Sizes<'_>,
-        rows: &[LogRow],
+        rows: &[LoggedValues],
     ) -> Result<LoopState> {
         let rows = CleanRows::new(rows, self.at.rpm, self.running.nominal.time())?;
         LoopState::new(&loop_response(self.running, Some(q), &rows)?, controller, sizes)
     }
 }
 
-fn largest(rows: &[LogRow]) -> [f64; 8] {
+fn largest(rows: &[LoggedValues]) -> [f64; 8] {
     let mut largest = [0.0_f64; 8];
     for row in rows {
         largest.iter_mut().zip(row).for_each(|(most, value)| *most = most.max(value.abs()));

@@ -5,7 +5,7 @@ use crate::error::refuse;
 use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, identified, loop_response};
 use crate::parameter::{NewLoop, parameter_of};
-use crate::rehearse::{Prediction, predict};
+use crate::rehearse::{DampingPrediction, predict};
 use crate::{Error, Result};
 use youla::identify::likelihood::Recommendation;
 use youla_loop::redesign::{
@@ -20,7 +20,7 @@ pub(crate) struct Proposal {
     pub(crate) before: LoopState,
     pub(crate) sizes: (Vec<f64>, Vec<f64>),
     pub(crate) new: NewLoop,
-    pub(crate) prediction: Prediction,
+    pub(crate) prediction: DampingPrediction,
     pub(crate) modes: Vec<ModeEntry>,
     /// Largest departure of S within its region, over frequency.
     pub(crate) region: Option<f64>,
@@ -73,7 +73,7 @@ fn designed(
     rows: &CleanRows,
     found: &Identification,
     goal: &Goal,
-) -> Result<(LoopState, NewLoop, Prediction)> {
+) -> Result<(LoopState, NewLoop, DampingPrediction)> {
     let model = match &found.recommended {
         Ok(model) if model.trusted() => model,
         Ok(model) => return refuse(format!("the model is not trusted: {}", model.reasons().join("; "))),

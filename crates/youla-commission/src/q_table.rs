@@ -2,7 +2,7 @@
 
 use crate::campaign::Campaign;
 use crate::error::refuse;
-use crate::record::{BetweenRecord, Evidence, PointStatus, read_json, write_json};
+use crate::record::{BetweenRecord, PointStatus, ScheduleEvidence, read_json, write_json};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -19,7 +19,7 @@ pub struct QTable {
     /// Ascending in speed.
     pub points: Vec<QAtSpeed>,
     /// Evidence on each way from a point to the next.
-    pub between: Vec<Evidence>,
+    pub between: Vec<ScheduleEvidence>,
 }
 
 /// Q at a speed.

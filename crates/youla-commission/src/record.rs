@@ -1,7 +1,7 @@
 //! What a campaign leaves: one record for each point, kept for an interrupted campaign, and summary.json.
 
 use crate::figures::LoopState;
-use crate::rehearse::Prediction;
+use crate::rehearse::DampingPrediction;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use youla_rt::Checksum;
 use youla_run::ModeEntry;
-use youla_twin::LogRow;
+use youla_twin::LoggedValues;
 
 /// How a point ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub struct PointRecord {
     #[serde(default)]
     pub region: Option<f64>,
     /// What was predicted of the verification.
-    pub predicted: Option<Prediction>,
+    pub predicted: Option<DampingPrediction>,
     /// The loop with the new Q, measured.
     pub reached: Option<LoopState>,
     /// States of the new Q.
@@ -73,7 +73,7 @@ pub struct BetweenRecord {
     /// Why it was stopped or taken back.
     pub reason: Option<String>,
     /// Evidence that all loops between the points are stable.
-    pub evidence: Option<Evidence>,
+    pub evidence: Option<ScheduleEvidence>,
     /// Speed of the check, halfway, revolutions per minute.
     pub rpm: f64,
     /// Least damping that is expected there: the lower bound of either point.
@@ -101,7 +101,7 @@ pub(crate) fn way_name(from: &str, to: &str) -> String {
 
 /// Figures of the evidence, see [`youla_loop::schedule`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
+pub struct ScheduleEvidence {
     /// Largest small-gain figure, below 1.
     pub gain: f64,
     /// How far S may depart from the line between the points, H-infinity norm.
@@ -116,7 +116,7 @@ pub struct Evidence {
     pub q_error: f64,
 }
 
-impl Evidence {
+impl ScheduleEvidence {
     /// Whether the figures are the same but for rounding.
     pub(crate) fn equals(&self, other: &Self) -> bool {
         let figures = |e: &Self| [e.gain, e.room, e.change, e.region, e.q_room, e.q_error];
@@ -242,7 +242,7 @@ pub(crate) fn io(path: &Path, source: std::io::Error) -> Error {
 }
 
 /// Rows as CSV.
-pub(crate) fn log_text(rows: &[LogRow], ts: f64) -> String {
+pub(crate) fn log_text(rows: &[LoggedValues], ts: f64) -> String {
     let mut text = String::from("t,y_h,y_v,u_h,u_v,alpha_1,alpha_2,beta_1,beta_2\n");
     for (k, row) in rows.iter().enumerate() {
         // Writing to a string cannot fail.

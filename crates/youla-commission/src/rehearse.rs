@@ -29,7 +29,7 @@ const STUDENT: f64 = 3.106;
 
 /// What is predicted of a verification.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
+pub struct DampingPrediction {
     /// Least damping of the loop on the model.
     pub damping: f64,
     /// Standard deviation of its measurement.
@@ -50,7 +50,7 @@ pub(crate) fn predict(
     new: &NewLoop,
     rows: &CleanRows,
     sizes: Sizes<'_>,
-) -> Result<Prediction> {
+) -> Result<DampingPrediction> {
     let state = LoopState::new(&disturbance_response(&model.plant, &new.controller)?, &new.controller, sizes)?;
     let v = at_plant_input(running, Some(&new.q), &rows.alpha)?;
     let noisy = with_noise(&model.predictor, &new.controller)?;
@@ -71,7 +71,7 @@ pub(crate) fn predict(
     let half = STUDENT * deviation;
     // The estimate of the loop has a bias that the rehearsals show; it depends on their noise, so both means count.
     let bounds = [mean.min(state.damping) - half, mean.max(state.damping) + half];
-    Ok(Prediction { damping: state.damping, deviation, bounds, sensitivity: state.sensitivity })
+    Ok(DampingPrediction { damping: state.damping, deviation, bounds, sensitivity: state.sensitivity })
 }
 
 /// The loop from the disturbance at the plant input and the innovations to the outputs.

@@ -77,7 +77,7 @@ pub use open::{open, read_bytes, read_text};
 pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, check_unit, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
-pub use synchronise::{ChannelTiming, Placement, Role, StampedChannel, Synchronised, synchronise};
+pub use synchronise::{ChannelRole, ChannelTiming, Placement, StampedChannel, Synchronised, synchronise};
 pub use target::{require_free, require_free_for_settings};
 pub use time::{Gaps, TimeSource, unit_of_time};
 pub use values::{Value, Variable, Variables};

@@ -44,7 +44,7 @@ mod tracker;
 pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, LARGEST_SIGNED, VERSION};
 pub use key::Key;
 pub use old::{OLD_VERSION, write_old_describe};
-pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, Source};
+pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, SequenceOrigin};
 pub use rows::{RowBatch, RowBlock, RowShape, RowView};
 pub use serial::{LARGEST_PACKET, PacketReader, write_packet};
 pub use station::{Machine, Station, is_stop};

@@ -8,7 +8,7 @@ pub const LARGEST_CHUNK: usize = 32;
 
 /// Where an excitation comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub enum SequenceOrigin {
     /// The sequence that the machine holds, for example the table of `youla excite`.
     Own,
     /// A pseudo-random binary sequence, independent for each input.
@@ -32,7 +32,7 @@ pub enum Request<'a> {
     /// Starts the excitation.
     Start {
         /// Where it comes from.
-        source: Source,
+        source: SequenceOrigin,
         /// Factor of the machine's own sequence, amplitude of the others.
         amplitude: f32,
     },
@@ -77,8 +77,8 @@ impl<'a> Request<'a> {
             2 => Request::Arm,
             3 => {
                 let source = match (reader.u8()?, reader.u8()?, reader.u16()?) {
-                    (0, 0, 0) => Source::Own,
-                    (1, order, hold) => Source::Prbs { order, hold },
+                    (0, 0, 0) => SequenceOrigin::Own,
+                    (1, order, hold) => SequenceOrigin::Prbs { order, hold },
                     _ => return None,
                 };
                 Request::Start { source, amplitude: reader.f32()? }
@@ -109,8 +109,8 @@ impl<'a> Request<'a> {
             Request::Arm => writer.put(&[2])?,
             Request::Start { source, amplitude } => {
                 let (kind, order, hold) = match source {
-                    Source::Own => (0, 0, 0),
-                    Source::Prbs { order, hold } => (1, order, hold),
+                    SequenceOrigin::Own => (0, 0, 0),
+                    SequenceOrigin::Prbs { order, hold } => (1, order, hold),
                 };
                 writer.put(&[3, kind, order])?;
                 writer.put(&hold.to_le_bytes())?;

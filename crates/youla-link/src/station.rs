@@ -2,15 +2,17 @@
 
 use crate::bytes::Reader;
 use crate::peers::{Number, Peers};
-use crate::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_CHUNK, Outcome, Reply, Request, RowBatch, Source, old};
-use youla_rt::{Checksum, Excitation, ExcitedLoop, LoopRefusal, Prbs, QRefusal, Row};
+use crate::{
+    Frame, FrameError, Kind, LARGEST_BODY, LARGEST_CHUNK, Outcome, Reply, Request, RowBatch, SequenceOrigin, old,
+};
+use youla_rt::{Checksum, ExcitationSource, ExcitedLoop, LoopRefusal, PrbsSource, QRefusal, Row};
 
 /// What a machine is, for its host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Machine<'a, const M: usize> {
     /// Name, sample time, channels: TOML of at most [`LARGEST_BODY`] - 17 bytes.
     pub description: &'a str,
-    /// The sequence of its own, for [`Source::Own`].
+    /// The sequence of its own, for [`SequenceOrigin::Own`].
     pub table: &'a [[f32; M]],
     /// Rows of a frame.
     pub rows: u16,
@@ -27,7 +29,7 @@ pub struct Station<'a, const N: usize, const M: usize, const P: usize, const K: 
     running: ExcitedLoop<f32, N, M, P, K>,
     machine: Machine<'a, M>,
     schema: u32,
-    source: Excitation<'a, f32, M, 0>,
+    source: ExcitationSource<'a, f32, M, 0>,
     amplitude: f32,
     batch: RowBatch<M, P>,
     sequence: u32,
@@ -48,7 +50,7 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
             running,
             machine,
             schema: schema.value(),
-            source: Excitation::Silent,
+            source: ExcitationSource::Silent,
             amplitude: 0.0,
             batch: RowBatch::new(machine.rows),
             sequence: 0,
@@ -240,10 +242,10 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         done.map_or_else(outcome_of, |()| Outcome::Done)
     }
 
-    fn start(&mut self, source: Source, amplitude: f32) -> Outcome {
+    fn start(&mut self, source: SequenceOrigin, amplitude: f32) -> Outcome {
         let chosen = match source {
-            Source::Own => Some(Excitation::Table(youla_rt::Table::new(self.machine.table))),
-            Source::Prbs { order, hold } => prbs(order, hold),
+            SequenceOrigin::Own => Some(ExcitationSource::Table(youla_rt::TableSource::new(self.machine.table))),
+            SequenceOrigin::Prbs { order, hold } => prbs(order, hold),
         };
         let (Some(chosen), true) = (chosen, amplitude.is_finite() && amplitude >= 0.0) else {
             return Outcome::Source;
@@ -325,13 +327,13 @@ pub fn is_stop(bytes: &[u8]) -> bool {
 }
 
 /// Registers that differ from input to input: odd multiples within the period.
-fn prbs<'a, const M: usize>(order: u8, hold: u16) -> Option<Excitation<'a, f32, M, 0>> {
+fn prbs<'a, const M: usize>(order: u8, hold: u16) -> Option<ExcitationSource<'a, f32, M, 0>> {
     let period = 1_u32.checked_shl(order.into()).filter(|_| order < 31)?.checked_sub(1)?;
     let mut starts = [1; M];
     for (start, number) in starts.iter_mut().zip(0_u32..) {
         *start = 1 + number.wrapping_mul(0x9e37_79b1).checked_rem(period)?;
     }
-    Prbs::new(order.into(), hold, starts, [1.0; M]).map(Excitation::Prbs)
+    PrbsSource::new(order.into(), hold, starts, [1.0; M]).map(ExcitationSource::Prbs)
 }
 
 fn outcome_of(refusal: LoopRefusal) -> Outcome {

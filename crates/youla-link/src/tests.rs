@@ -289,10 +289,10 @@ fn dialogue() {
     let mut station = station();
     let described = ask(&mut station, 0, Request::Describe);
     assert_eq!(described, (Outcome::Done, b"name = \"two\"".to_vec()));
-    let start = Request::Start { source: Source::Prbs { order: 7, hold: 2 }, amplitude: 0.5 };
+    let start = Request::Start { source: SequenceOrigin::Prbs { order: 7, hold: 2 }, amplitude: 0.5 };
     assert_eq!(ask(&mut station, 1, start).0, Outcome::NotArmed);
     assert_eq!(ask(&mut station, 2, Request::Arm).0, Outcome::Done);
-    let wrong = Request::Start { source: Source::Prbs { order: 8, hold: 2 }, amplitude: 0.5 };
+    let wrong = Request::Start { source: SequenceOrigin::Prbs { order: 8, hold: 2 }, amplitude: 0.5 };
     assert_eq!(ask(&mut station, 3, wrong).0, Outcome::Source);
     assert_eq!(ask(&mut station, 4, start).0, Outcome::Done);
     // The same request again is answered again.

@@ -9,7 +9,7 @@ use youla::identify::likelihood::{ResponseTable, ResponseVariance};
 use youla::lti::Discrete;
 use youla::signal::{Channel, Record};
 use youla::{Mat, c64};
-use youla_io::{ChannelRef, ChannelSpec, Role, Source, StampedChannel, TimeSource};
+use youla_io::{ChannelRef, ChannelRole, ChannelSpec, Source, StampedChannel, TimeSource};
 
 /// A record as Python holds it: name, sample time, channels with name, unit and column, and an array of samples x columns.
 pub(crate) type Log<'py> = (String, f64, Vec<(String, String, usize)>, PyReadonlyArray2<'py, f64>);
@@ -133,9 +133,9 @@ pub(crate) fn synchronise<'py>(
 ) -> PyResult<SynchronisedOut<'py>> {
     let one = |(name, unit, role, changes_only, times, values): Stamped<'_>| {
         let role = match role.as_str() {
-            "inputs" => Role::Input,
-            "outputs" => Role::Output,
-            _ => Role::External,
+            "inputs" => ChannelRole::Input,
+            "outputs" => ChannelRole::Output,
+            _ => ChannelRole::External,
         };
         let of = |array: PyReadonlyArray1<'_, f64>| array.as_array().to_vec();
         StampedChannel { channel: Channel::new(name, unit), role, changes_only, times: of(times), values: of(values) }

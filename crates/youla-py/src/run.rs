@@ -64,8 +64,8 @@ pub(crate) fn identify_file(py: Python<'_>, path: PathBuf) -> PyResult<Run> {
 #[pyfunction]
 pub(crate) fn demo(py: Python<'_>, machine: &str, seed: u64) -> PyResult<Run> {
     let machine = match machine {
-        "levitation" => youla_twin::Machine::Levitation,
-        "bearing" => youla_twin::Machine::Bearing,
+        "levitation" => youla_twin::DemoMachine::Levitation,
+        "bearing" => youla_twin::DemoMachine::Bearing,
         other => {
             let message = format!("machine is {other:?}, but must be \"levitation\" or \"bearing\"");
             return Err(Failure::input(message).into());

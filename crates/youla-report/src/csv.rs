@@ -1,7 +1,7 @@
 //! The numbers behind a figure or a table, for other programs.
 
-use super::data::Method;
-use super::figure::{Cell, Cells, Content, Curve, Figure, Panel, Region, Sample};
+use super::data::DrawnMethod;
+use super::figure::{Area, Cell, Cells, Content, Curve, Figure, Panel, Sample};
 use super::story::Table;
 
 /// All columns that a figure may have; a file holds those of the kinds of panel that the figure has.
@@ -23,14 +23,14 @@ type Line = Vec<(&'static str, String)>;
 /// were; NaN is an empty field.
 ///
 /// ```
-/// use youla_report::data::Method;
+/// use youla_report::data::DrawnMethod;
 /// use youla_report::figure::{Content, Figure, Panel, Sample};
 /// let sample = Sample { method: "direct".into(), note: String::new(), values: vec![0.1, f64::NAN] };
 /// let panel = Panel { title: "fit".into(), content: Content::Boxes(vec![sample]), ..Panel::default() };
-/// let file = youla_report::figure_csv(&Figure { panels: vec![panel], ..Figure::default() }, &[Method::direct()]);
+/// let file = youla_report::figure_csv(&Figure { panels: vec![panel], ..Figure::default() }, &[DrawnMethod::direct()]);
 /// assert_eq!(file, "panel,method,note,value\nfit,direct N4SID,,0.1\nfit,direct N4SID,,\n");
 /// ```
-pub fn figure_csv(figure: &Figure, methods: &[Method]) -> String {
+pub fn figure_csv(figure: &Figure, methods: &[DrawnMethod]) -> String {
     let label = |key: &str| match methods.iter().find(|method| method.key == key) {
         Some(method) => method.label.clone(),
         None => key.to_owned(),
@@ -49,8 +49,8 @@ pub fn figure_csv(figure: &Figure, methods: &[Method]) -> String {
 /// A table as CSV; a heading below a group is written `group: heading`.
 ///
 /// ```
-/// use youla_report::story::{Row, Table};
-/// let row = Row { method: String::new(), cells: vec!["direct".into(), "\u{2212}12.5".into()] };
+/// use youla_report::story::{TableRow, Table};
+/// let row = TableRow { method: String::new(), cells: vec!["direct".into(), "\u{2212}12.5".into()] };
 /// let table = Table {
 ///     groups: vec![(String::new(), 1), ("horizontal".into(), 1)],
 ///     header: vec!["method".into(), "fit".into()],
@@ -104,7 +104,7 @@ fn points(curve: &Curve, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     curve.x.iter().zip(&curve.y).zip(along).map(line).collect()
 }
 
-fn edges(region: &Region, label: &dyn Fn(&str) -> String) -> Vec<Line> {
+fn edges(region: &Area, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     let line = |(x, (low, high)): (&f64, (&f64, &f64))| {
         of(label(&region.method), &region.note, [("x", number(*x)), ("low", number(*low)), ("high", number(*high))])
     };
@@ -151,7 +151,7 @@ fn written(lines: impl Iterator<Item = Vec<String>>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::story::Row;
+    use super::super::story::TableRow;
     use super::*;
 
     fn read(file: &str) -> Vec<Vec<String>> {
@@ -170,7 +170,7 @@ mod tests {
         let curve =
             Curve { method: "pem".into(), note: "a, \"b\"".into(), x: x.clone(), y: y.clone(), ..Curve::default() };
         let figure = Figure { panels: vec![panel("one", Content::Curves(vec![curve]))], ..Figure::default() };
-        let lines = read(&figure_csv(&figure, &[Method::pem()]));
+        let lines = read(&figure_csv(&figure, &[DrawnMethod::pem()]));
         assert_eq!(lines[0], ["panel", "method", "note", "x", "y"]);
         assert_eq!(lines.len(), 1 + y.len());
         for (line, (x, y)) in lines[1..].iter().zip(x.iter().zip(&y)) {
@@ -189,7 +189,7 @@ mod tests {
         let cells = Cells { columns: vec!["c".into()], rows: vec!["r".into()], cells: vec![cell] };
         let sample = Sample { method: "unknown".into(), note: String::new(), values: vec![2.0] };
         let panels = vec![panel("", Content::Cells(cells)), panel("", Content::Boxes(vec![sample]))];
-        let file = figure_csv(&Figure { panels, ..Figure::default() }, &[Method::hansen()]);
+        let file = figure_csv(&Figure { panels, ..Figure::default() }, &[DrawnMethod::hansen()]);
         let lines = read(&file);
         assert_eq!(
             lines[0],
@@ -203,10 +203,10 @@ mod tests {
     fn areas_and_what_belongs_to_a_point_have_columns_of_their_own() {
         let curve = Curve { method: "pem".into(), x: vec![1.0], y: vec![2.0], along: vec![3.0], ..Curve::default() };
         let region =
-            Region { method: "pem".into(), note: "95 %".into(), x: vec![1.0], low: vec![-1.5], high: vec![f64::NAN] };
+            Area { method: "pem".into(), note: "95 %".into(), x: vec![1.0], low: vec![-1.5], high: vec![f64::NAN] };
         let content = Content::Curves(vec![curve]);
         let panels = vec![Panel { title: "one".into(), content, regions: vec![region], ..Panel::default() }];
-        let lines = read(&figure_csv(&Figure { panels, ..Figure::default() }, &[Method::pem()]));
+        let lines = read(&figure_csv(&Figure { panels, ..Figure::default() }, &[DrawnMethod::pem()]));
         assert_eq!(lines[0], ["panel", "method", "note", "x", "y", "along", "low", "high"]);
         assert_eq!(lines[1], ["one", "PEM", "", "1", "2", "3", "", ""]);
         assert_eq!(lines[2], ["one", "PEM", "95 %", "1", "", "", "-1.5", ""]);
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn tables_have_one_header_and_plain_numbers() {
-        let row = |cells: [&str; 3]| Row { method: String::new(), cells: cells.map(String::from).to_vec() };
+        let row = |cells: [&str; 3]| TableRow { method: String::new(), cells: cells.map(String::from).to_vec() };
         let table = Table {
             groups: vec![("record".into(), 1), ("fit, %".into(), 2)],
             header: vec![String::new(), "direct".into(), "Hansen".into()],

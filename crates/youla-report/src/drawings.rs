@@ -1,6 +1,6 @@
 //! What the script of a page reads: figures, where each of them is drawn, and the styles of all that they name.
 
-use super::data::Method;
+use super::data::DrawnMethod;
 use super::figure::{Content, Figure};
 use super::page::ALL_POINTS;
 use super::svg::{Marker, Styles};
@@ -30,7 +30,7 @@ struct PageStyle<'a> {
 }
 
 /// Figures with as many points as a page takes, each with the name of its place.
-pub(super) fn drawings<'a>(methods: &'a [Method], figures: &'a [(String, Figure)]) -> Drawings<'a> {
+pub(super) fn drawings<'a>(methods: &'a [DrawnMethod], figures: &'a [(String, Figure)]) -> Drawings<'a> {
     let most = thin::most_points(figures.iter().map(|(_, figure)| figure), ALL_POINTS);
     let styles = Styles::new(methods);
     let style = |key: &'a str| {

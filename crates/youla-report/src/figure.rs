@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Key of the measured signal in curves; all other keys are those of [`super::data::Method`], or say themselves what they are.
+/// Key of the measured signal in curves; all other keys are those of [`super::data::DrawnMethod`], or say themselves what they are.
 pub const MEASURED: &str = "measured";
 
 /// One figure of one or more panels.
@@ -50,7 +50,7 @@ pub struct Panel {
     pub content: Content,
     /// Areas behind the curves; they are data as the curves are.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub regions: Vec<Region>,
+    pub regions: Vec<Area>,
     /// Lines for orientation, which are no data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub guides: Vec<Guide>,
@@ -71,7 +71,7 @@ pub struct Panel {
 /// The area between two curves.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Region {
+pub struct Area {
     /// Key of a method, which gives the colour.
     pub method: String,
     /// Added to the label of the method, for example "95 %"; mostly not empty, which distinguishes it from the curve.

@@ -6,7 +6,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::data::{LoopMargins, Method, ReportData, Role};
+use super::data::{DrawnMethod, LoopMargins, MethodRole, ReportData};
 use super::drawings::drawings;
 use super::figure::Figure;
 use super::run_figures::{FigureChoice, RunFigure, run_drawings};
@@ -46,7 +46,7 @@ pub fn html(data: &ReportData) -> Result<String> {
 /// The model that the result is about: the recommended one, where there is none G(S).
 #[derive(Serialize)]
 struct Subject<'a> {
-    method: &'a Method,
+    method: &'a DrawnMethod,
     modes: Vec<ShownMode>,
     margins: Option<&'a LoopMargins>,
     largest_pole: Option<f64>,
@@ -54,8 +54,8 @@ struct Subject<'a> {
 
 /// Nothing for a comparison of runs, and where nothing is known of the model.
 fn subject(data: &ReportData) -> Option<Subject<'_>> {
-    let of = |role: Role| data.methods.iter().find(|method| method.role == role);
-    let method = of(Role::Recommended).or_else(|| of(Role::Hansen)).filter(|_| data.overview.is_empty())?;
+    let of = |role: MethodRole| data.methods.iter().find(|method| method.role == role);
+    let method = of(MethodRole::Recommended).or_else(|| of(MethodRole::Hansen)).filter(|_| data.overview.is_empty())?;
     let certificate = data.certificates.iter().find(|one| one.method == method.key);
     let subject = Subject {
         method,
@@ -82,7 +82,7 @@ fn placed(data: &ReportData) -> Result<Vec<(String, Figure)>> {
 }
 
 /// The methods of the run, and the loops that a new controller is compared with.
-fn methods(data: &ReportData) -> Vec<Method> {
+fn methods(data: &ReportData) -> Vec<DrawnMethod> {
     let loops = data.redesign.iter().flat_map(|new| &new.loops);
     let new = loops.filter(|one| data.methods.iter().all(|method| method.key != one.key));
     data.methods.iter().chain(new).cloned().collect()

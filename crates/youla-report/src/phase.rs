@@ -3,18 +3,18 @@
 //! A phase is known up to multiples of 360 deg. Curves of models are made continuous and moved as a whole, measured points
 //! are moved one by one, each to the branch nearest to one reference curve, so that curves that agree are drawn together.
 
-use super::data::{FrequencyResponse, Role};
+use super::data::{DrawnResponses, MethodRole};
 
 /// Chooses the branches of all phases, for each pair of output and input by itself.
-pub(super) fn align(response: &mut FrequencyResponse, role_of: impl Fn(&str) -> Role) {
+pub(super) fn align(response: &mut DrawnResponses, role_of: impl Fn(&str) -> MethodRole) {
     for curve in &mut response.models {
         unwrap(&mut curve.phase_deg);
     }
     let mut models = response.models.clone();
     models.sort_by_key(|curve| match role_of(&curve.method) {
-        Role::Recommended | Role::Hansen => 0,
-        Role::HansenReduced => 1,
-        Role::Nominal => 3,
+        MethodRole::Recommended | MethodRole::Hansen => 0,
+        MethodRole::HansenReduced => 1,
+        MethodRole::Nominal => 3,
         _ => 2,
     });
     for curve in &mut response.models {
@@ -85,8 +85,8 @@ mod tests {
             coherence: vec![1.0; 100],
         };
         let models = vec![model("direct", &shifted), model("hansen", &wrapped)];
-        let mut response = FrequencyResponse { hz, models, indirect: vec![measured], ..FrequencyResponse::default() };
-        align(&mut response, |key| if key == "hansen" { Role::Hansen } else { Role::Direct });
+        let mut response = DrawnResponses { hz, models, indirect: vec![measured], ..DrawnResponses::default() };
+        align(&mut response, |key| if key == "hansen" { MethodRole::Hansen } else { MethodRole::Direct });
         for phase in [&response.models[0].phase_deg, &response.models[1].phase_deg, &response.indirect[0].phase_deg] {
             assert!(phase.iter().zip(&smooth).all(|(a, b)| (a - b).abs() < 1e-9));
         }

@@ -1,6 +1,6 @@
 //! Which modes of two models are the same one: by frequency, damping and residue, each mode once.
 
-use super::data::Mode;
+use super::data::DrawnMode;
 
 /// Largest ratio of the frequencies.
 const FREQUENCY: f64 = 1.1;
@@ -18,7 +18,7 @@ const SIZE: f64 = 10.0;
 /// Two modes are the same where both are real poles or both are pairs, within 10 % of frequency, within 0.02 and half of the larger
 /// damping ratio, and, where residues are known, with a modal assurance of at least 0.5 and sizes within a factor of 10. These limits
 /// are chosen, not measured.
-pub fn match_modes(modes: &[&Mode], others: &[&Mode]) -> Vec<Option<usize>> {
+pub fn match_modes(modes: &[&DrawnMode], others: &[&DrawnMode]) -> Vec<Option<usize>> {
     let pairs = modes
         .iter()
         .enumerate()
@@ -36,9 +36,9 @@ pub fn match_modes(modes: &[&Mode], others: &[&Mode]) -> Vec<Option<usize>> {
 }
 
 /// How far two modes are from each other in the limits of all criteria; nothing where they are not the same.
-fn distance(a: &Mode, b: &Mode) -> Option<f64> {
+fn distance(a: &DrawnMode, b: &DrawnMode) -> Option<f64> {
     // An integrator has no frequency, and no damping ratio.
-    let real = |mode: &Mode| mode.hz == 0.0 || mode.zeta.abs() >= REAL;
+    let real = |mode: &DrawnMode| mode.hz == 0.0 || mode.zeta.abs() >= REAL;
     let frequency = if a.hz == b.hz { 0.0 } else { (a.hz / b.hz).ln().abs() / FREQUENCY.ln() };
     let damping = (a.zeta - b.zeta).abs() / (DAMPING + 0.5 * a.zeta.abs().max(b.zeta.abs()));
     let [shape, size] = residues(&a.residue, &b.residue);
@@ -65,11 +65,11 @@ fn residues(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    fn mode(hz: f64, zeta: f64, residue: &[[f64; 2]]) -> Mode {
-        Mode { method: String::new(), hz, zeta, deviation: None, residue: residue.to_vec() }
+    fn mode(hz: f64, zeta: f64, residue: &[[f64; 2]]) -> DrawnMode {
+        DrawnMode { method: String::new(), hz, zeta, deviation: None, residue: residue.to_vec() }
     }
 
-    fn matched(modes: &[Mode], others: &[Mode]) -> Vec<Option<usize>> {
+    fn matched(modes: &[DrawnMode], others: &[DrawnMode]) -> Vec<Option<usize>> {
         match_modes(&modes.iter().collect::<Vec<_>>(), &others.iter().collect::<Vec<_>>())
     }
 

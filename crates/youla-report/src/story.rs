@@ -1,6 +1,6 @@
 //! A page: sections of text, tables and figures in order.
 
-use super::data::Method;
+use super::data::DrawnMethod;
 use super::figure::Figure;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct Story {
     /// Program and version.
     pub program: String,
     /// Methods in the order in which they are listed and drawn; they decide colours and markers.
-    pub methods: Vec<Method>,
+    pub methods: Vec<DrawnMethod>,
     /// The sections in order.
     pub sections: Vec<Section>,
 }
@@ -71,13 +71,13 @@ pub struct Table {
     /// Column headings.
     pub header: Vec<String>,
     /// The rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
 }
 
 /// One row of a table.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct TableRow {
     /// Key of the method that the row is about, for its colour; empty for none.
     pub method: String,
     /// As the text of the first column, then one text per further column. Those that are numbers are to the right.
@@ -90,7 +90,7 @@ pub fn section(key: &str, title: &str, short: &str, blocks: Vec<Block>) -> Secti
 }
 
 /// A table without groups of columns.
-pub fn plain(key: &str, title: &str, caption: impl Into<String>, header: &[&str], rows: Vec<Row>) -> Table {
+pub fn plain(key: &str, title: &str, caption: impl Into<String>, header: &[&str], rows: Vec<TableRow>) -> Table {
     Table {
         key: key.into(),
         title: title.into(),

@@ -114,7 +114,7 @@ fn is_number(cell: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::story::Row;
+    use crate::story::TableRow;
 
     #[test]
     fn columns_of_numbers_stand_to_the_right() {
@@ -123,7 +123,7 @@ mod tests {
             ["2", "\u{2212}4.2 ± 0.1", "2 of 3 runs", "12 %", ""],
             ["3", "none", "inf", "< 1e-9", ""],
         ];
-        let row = |cells: &[&str; 5]| Row { method: String::new(), cells: cells.map(String::from).into() };
+        let row = |cells: &[&str; 5]| TableRow { method: String::new(), cells: cells.map(String::from).into() };
         let table = Table { header: vec![String::new(); 5], rows: rows.iter().map(row).collect(), ..Table::default() };
         assert_eq!(columns_of_numbers(&table), [false, true, false, true, false]);
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::data::{Mode, ReportData};
+use super::data::{DrawnMode, ReportData};
 use super::same_mode::match_modes;
 
 /// One record and output with the fit of each method.
@@ -75,7 +75,7 @@ pub(super) enum Nature {
 const TOLD: f64 = 2.0;
 
 impl Nature {
-    fn of(mode: &Mode) -> Self {
+    fn of(mode: &DrawnMode) -> Self {
         let within = |size: f64, k: usize| mode.deviation.is_some_and(|deviation| size < TOLD * deviation[k]);
         match mode.zeta {
             _ if mode.hz == 0.0 => Nature::Integrator,
@@ -93,12 +93,12 @@ impl Nature {
 #[derive(Debug, Clone, Serialize, PartialEq)]
 pub(super) struct ShownMode {
     #[serde(flatten)]
-    pub(super) mode: Mode,
+    pub(super) mode: DrawnMode,
     pub(super) nature: Nature,
 }
 
-impl From<&Mode> for ShownMode {
-    fn from(mode: &Mode) -> Self {
+impl From<&DrawnMode> for ShownMode {
+    fn from(mode: &DrawnMode) -> Self {
         ShownMode { mode: mode.clone(), nature: Nature::of(mode) }
     }
 }
@@ -113,8 +113,9 @@ pub(super) struct ModeRow {
 pub(super) fn mode_rows(data: &ReportData) -> Vec<ModeRow> {
     let mut rows: Vec<ModeRow> = Vec::new();
     for (column, method) in data.methods.iter().enumerate() {
-        let own: Vec<&Mode> = data.modes.iter().filter(|mode| mode.method == method.key).collect();
-        let first: Vec<&Mode> = rows.iter().filter_map(|row| Some(&row.cells.iter().flatten().next()?.mode)).collect();
+        let own: Vec<&DrawnMode> = data.modes.iter().filter(|mode| mode.method == method.key).collect();
+        let first: Vec<&DrawnMode> =
+            rows.iter().filter_map(|row| Some(&row.cells.iter().flatten().next()?.mode)).collect();
         let places = match_modes(&own, &first);
         for (mode, place) in own.into_iter().zip(places) {
             let place = place.unwrap_or_else(|| {
@@ -131,16 +132,16 @@ pub(super) fn mode_rows(data: &ReportData) -> Vec<ModeRow> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::data::{Fit, Method};
+    use super::super::data::{DrawnMethod, Fit};
     use super::*;
 
     fn data() -> ReportData {
         let fit =
             |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
         let mode =
-            |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1, deviation: None, residue: Vec::new() };
+            |method: &str, hz| DrawnMode { method: method.into(), hz, zeta: 0.1, deviation: None, residue: Vec::new() };
         ReportData {
-            methods: vec![Method::nominal(), Method::direct(), Method::hansen()],
+            methods: vec![DrawnMethod::nominal(), DrawnMethod::direct(), DrawnMethod::hansen()],
             fits: vec![fit("b", "hansen", Some(90.0)), fit("b", "direct", None), fit("a", "hansen", Some(80.0))],
             modes: vec![mode("hansen", 54.9), mode("direct", 54.0), mode("direct", 56.0), mode("hansen", 120.0)],
             ..ReportData::default()
@@ -168,8 +169,9 @@ mod tests {
 
     #[test]
     fn a_pole_within_its_deviation_of_an_integrator_is_none_that_grows() {
-        let nature =
-            |hz, zeta, deviation| Nature::of(&Mode { method: String::new(), hz, zeta, deviation, residue: Vec::new() });
+        let nature = |hz, zeta, deviation| {
+            Nature::of(&DrawnMode { method: String::new(), hz, zeta, deviation, residue: Vec::new() })
+        };
         assert_eq!(nature(0.01, -1.0, Some([0.12, 0.0])), Nature::NearIntegrator);
         assert_eq!(nature(0.01, 1.0, Some([0.12, 0.0])), Nature::NearIntegrator);
         assert_eq!(nature(0.04, -1.0, Some([0.0076, 0.0])), Nature::GrowingReal);

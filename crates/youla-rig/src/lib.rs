@@ -22,7 +22,7 @@ pub use rig::{Answer, Rig, random_number};
 pub use settings::settings;
 pub use sink::{CsvLog, LogRow, PlotStream, RowSink};
 pub use twin::{Pace, Port, RotorStation, Twin, rotor, serve};
-pub use youla_link::{Outcome, Request, Source};
+pub use youla_link::{Outcome, Request, SequenceOrigin};
 pub use youla_rt::{Cause, Phase, Status, Trip};
 
 #[cfg(test)]

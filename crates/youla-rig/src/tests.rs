@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use youla_link::{Key, LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
+use youla_link::{Key, LARGEST_FRAME, Machine, Outcome, Request, SequenceOrigin, Station};
 use youla_rt::{Cause, Controller, ExcitedLoop, Limits, Matrices, OUT_WITHIN, Phase, QCoefficients};
 
 mod board;
@@ -78,7 +78,7 @@ fn record(seconds: u64) {
     let path = file(&format!("real-time-{seconds}"));
     let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();
     rig.ask(&Request::Arm).unwrap();
-    let start = Request::Start { source: Source::Prbs { order: 15, hold: 4 }, amplitude: 0.5 };
+    let start = Request::Start { source: SequenceOrigin::Prbs { order: 15, hold: 4 }, amplitude: 0.5 };
     rig.ask(&start).unwrap();
     let first = rig.ask(&Request::Alive).unwrap();
     assert_eq!(first.status.phase(), Phase::Exciting);
@@ -308,7 +308,7 @@ fn fault(number: u64) -> Result<(), String> {
     let mut recorder = Recorder::create(&path, &machine, twin.station.schema()).unwrap();
     next();
     assert_eq!(ask(&mut twin, next(), &Request::Arm).0, Outcome::Done);
-    let start = Request::Start { source: Source::Prbs { order: 15, hold: 4 }, amplitude: 1.0 };
+    let start = Request::Start { source: SequenceOrigin::Prbs { order: 15, hold: 4 }, amplitude: 1.0 };
     assert_eq!(ask(&mut twin, next(), &start).0, Outcome::Done);
     let at = 600 + 37 * number;
     let channel = (number / 6 % 2) as usize;

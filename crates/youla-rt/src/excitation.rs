@@ -15,18 +15,18 @@ pub struct Tone<T, const M: usize> {
 
 /// A sum of L lines by recursion. It starts again after each period, so that all periods have the same bits and rounding does not add up.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Multisine<T, const M: usize, const L: usize> {
+pub struct MultisineSource<T, const M: usize, const L: usize> {
     tones: [Tone<T, M>; L],
     phasors: [[T; 2]; L],
     period: u32,
     place: u32,
 }
 
-impl<T: Real, const M: usize, const L: usize> Multisine<T, M, L> {
+impl<T: Real, const M: usize, const L: usize> MultisineSource<T, M, L> {
     /// With a period of so many samples, at least 1; each tone must have whole cycles in it.
     #[must_use]
     pub fn new(tones: [Tone<T, M>; L], period: u32) -> Self {
-        Multisine { tones, phasors: [[T::ONE, T::ZERO]; L], period: period.max(1), place: 0 }
+        MultisineSource { tones, phasors: [[T::ONE, T::ZERO]; L], period: period.max(1), place: 0 }
     }
 
     fn next(&mut self) -> [T; M] {
@@ -48,7 +48,7 @@ impl<T: Real, const M: usize, const L: usize> Multisine<T, M, L> {
 
 /// A pseudo-random binary sequence of maximal length for each input, from a shift register.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prbs<T, const M: usize> {
+pub struct PrbsSource<T, const M: usize> {
     registers: [u32; M],
     mask: u32,
     hold: u16,
@@ -73,7 +73,7 @@ const TRINOMIALS: [(u32, u32); 13] = [
     (23, 18),
 ];
 
-impl<T: Real, const M: usize> Prbs<T, M> {
+impl<T: Real, const M: usize> PrbsSource<T, M> {
     /// A register of `order` bits has a period of `2^order - 1` values of `hold` samples each. Inputs with different
     /// `starts`, which lie between 1 and the period, get the same sequence at different places. None for an order without a primitive trinomial (3
     /// to 7, 9, 10, 11, 15, 17, 18, 20 and 23 have one) and for a start out of range.
@@ -82,7 +82,7 @@ impl<T: Real, const M: usize> Prbs<T, M> {
         let (_, second) = TRINOMIALS.into_iter().find(|(known, _)| *known == order)?;
         let mask = 1 << (order - 1) | 1 << (second - 1);
         let in_range = starts.iter().all(|start| (1..1 << order).contains(start));
-        in_range.then(|| Prbs { registers: starts, mask, hold: hold.max(1), left: hold.max(1), amplitudes })
+        in_range.then(|| PrbsSource { registers: starts, mask, hold: hold.max(1), left: hold.max(1), amplitudes })
     }
 
     fn next(&mut self) -> [T; M] {
@@ -105,16 +105,16 @@ impl<T: Real, const M: usize> Prbs<T, M> {
 
 /// The rows of a table, one for each sample, again and again.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table<'a, T, const M: usize> {
+pub struct TableSource<'a, T, const M: usize> {
     rows: &'a [[T; M]],
     place: usize,
 }
 
-impl<'a, T: Real, const M: usize> Table<'a, T, M> {
+impl<'a, T: Real, const M: usize> TableSource<'a, T, M> {
     /// From its first row on; without rows it is 0.
     #[must_use]
     pub fn new(rows: &'a [[T; M]]) -> Self {
-        Table { rows, place: 0 }
+        TableSource { rows, place: 0 }
     }
 
     fn next(&mut self) -> [T; M] {
@@ -126,27 +126,27 @@ impl<'a, T: Real, const M: usize> Table<'a, T, M> {
 
 /// A source of excitation. L is the largest number of lines of a multisine.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub enum Excitation<'a, T, const M: usize, const L: usize> {
+pub enum ExcitationSource<'a, T, const M: usize, const L: usize> {
     /// Zero.
     #[default]
     Silent,
     /// Lines of given frequencies.
-    Multisine(Multisine<T, M, L>),
+    Multisine(MultisineSource<T, M, L>),
     /// Two levels.
-    Prbs(Prbs<T, M>),
+    Prbs(PrbsSource<T, M>),
     /// Any sequence.
-    Table(Table<'a, T, M>),
+    Table(TableSource<'a, T, M>),
 }
 
-impl<T: Real, const M: usize, const L: usize> Excitation<'_, T, M, L> {
+impl<T: Real, const M: usize, const L: usize> ExcitationSource<'_, T, M, L> {
     /// The value of this sample; the source moves on.
     #[inline]
     pub fn advance(&mut self) -> [T; M] {
         match self {
-            Excitation::Silent => [T::ZERO; M],
-            Excitation::Multisine(multisine) => multisine.next(),
-            Excitation::Prbs(prbs) => prbs.next(),
-            Excitation::Table(table) => table.next(),
+            ExcitationSource::Silent => [T::ZERO; M],
+            ExcitationSource::Multisine(multisine) => multisine.next(),
+            ExcitationSource::Prbs(prbs) => prbs.next(),
+            ExcitationSource::Table(table) => table.next(),
         }
     }
 }
@@ -177,7 +177,8 @@ mod tests {
             let (cosine, sine) = series(angle(cycles));
             Tone { cosine: cosine as f32, sine: sine as f32, gains: [[1.0, 0.0], [0.0, 2.0]] }
         });
-        let mut source: Excitation<'_, f32, 2, 2> = Excitation::Multisine(Multisine::new(tones, PERIOD));
+        let mut source: ExcitationSource<'_, f32, 2, 2> =
+            ExcitationSource::Multisine(MultisineSource::new(tones, PERIOD));
         let first: [[f32; 2]; PERIOD as usize] = core::array::from_fn(|_| source.advance());
         for _ in 0..3 {
             for row in &first {
@@ -200,7 +201,7 @@ mod tests {
     #[test]
     fn every_register_has_its_maximal_period() {
         for (order, _) in TRINOMIALS {
-            let mut prbs = Prbs::new(order, 1, [1], [1.0_f32]).unwrap();
+            let mut prbs = PrbsSource::new(order, 1, [1], [1.0_f32]).unwrap();
             let period = (1_u32 << order) - 1;
             let mut ones = 0_u32;
             for k in 0..period {
@@ -210,21 +211,22 @@ mod tests {
             assert_eq!(prbs.registers, [1], "order {order}");
             assert_eq!(ones, 1 << (order - 1), "order {order}");
         }
-        assert_eq!(Prbs::new(8, 1, [1], [1.0_f32]), None);
-        assert_eq!(Prbs::new(3, 1, [8], [1.0_f32]), None);
-        assert_eq!(Prbs::new(3, 1, [0], [1.0_f32]), None);
+        assert_eq!(PrbsSource::new(8, 1, [1], [1.0_f32]), None);
+        assert_eq!(PrbsSource::new(3, 1, [8], [1.0_f32]), None);
+        assert_eq!(PrbsSource::new(3, 1, [0], [1.0_f32]), None);
     }
 
     #[test]
     fn held_values_and_tables_repeat() {
-        let mut source: Excitation<'_, f64, 2, 0> = Excitation::Prbs(Prbs::new(3, 3, [1, 2], [1.0, 5.0]).unwrap());
+        let mut source: ExcitationSource<'_, f64, 2, 0> =
+            ExcitationSource::Prbs(PrbsSource::new(3, 3, [1, 2], [1.0, 5.0]).unwrap());
         let rows: [[f64; 2]; 9] = core::array::from_fn(|_| source.advance());
         assert!(rows.chunks(3).all(|held| held.iter().all(|row| *row == held[0])));
         assert_ne!(rows[0], rows[3]);
         let table = [[1.0, 2.0], [3.0, 4.0]];
-        let mut source: Excitation<'_, f64, 2, 0> = Excitation::Table(Table::new(&table));
+        let mut source: ExcitationSource<'_, f64, 2, 0> = ExcitationSource::Table(TableSource::new(&table));
         assert_eq!([source.advance(), source.advance(), source.advance()], [table[0], table[1], table[0]]);
-        let mut none: Excitation<'_, f64, 1, 0> = Excitation::Table(Table::new(&[]));
+        let mut none: ExcitationSource<'_, f64, 1, 0> = ExcitationSource::Table(TableSource::new(&[]));
         assert_eq!(none.advance(), [0.0]);
     }
 }

@@ -23,7 +23,7 @@
 //! a safety stop: `beta = Mt y - Nt u` (28) remains true, the observer does not wind up, and identification sees no error.
 //!
 //! [`ExcitedLoop`] is the whole loop of a firmware around it, `command -> limit -> apply -> observe`: excitation with ramps
-//! ([`Excitation`]), a guard that ends it ([`Limits`], [`Cause`]), and a parameter Q that is exchanged while the loop runs
+//! ([`ExcitationSource`]), a guard that ends it ([`Limits`], [`Cause`]), and a parameter Q that is exchanged while the loop runs
 //! ([`QCoefficients`]).
 //!
 //! # Example
@@ -65,7 +65,7 @@ mod status;
 
 pub use checksum::Checksum;
 pub use controller::{Controller, Output, State};
-pub use excitation::{Excitation, Multisine, Prbs, Table, Tone};
+pub use excitation::{ExcitationSource, MultisineSource, PrbsSource, TableSource, Tone};
 pub use excited_loop::{ExcitedLoop, LoopRefusal, Row};
 pub use filter::Filter;
 pub use guard::{Cause, Limits, Trip};

@@ -14,7 +14,7 @@ use youla::signal::{Detrend, LoopRecord, Record};
 use youla_io::export::{SequenceFormat, export_sequence};
 use youla_io::folder::replace_files;
 use youla_io::{Format, Gaps, Source, TimeSource, read, require_free};
-use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, PredictedPeak, excite, output_noise};
+use youla_loop::excite::{ExciteOptions, Excited, LoopToExcite, PredictedPeak, excite, output_noise};
 
 /// Where the excitation enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,7 +81,7 @@ pub fn excite_run(
     let (inputs, outputs) = (channels_of(&settings.data.inputs), channels_of(&settings.data.outputs));
     let ported = ported(settings, folder, &declared, port)?;
     let on =
-        ExcitedLoop { nominal: declared.required_nominal()?, controller: &ported, inputs: &inputs, outputs: &outputs };
+        LoopToExcite { nominal: declared.required_nominal()?, controller: &ported, inputs: &inputs, outputs: &outputs };
     let mut options = options.clone();
     if let Some(file) = quiet {
         options.noise = noise_of(settings, &on, file).map_err(|e| e.within(file.display().to_string()))?;
@@ -161,7 +161,7 @@ fn ported(
     Ok(factorise((nominal, &declared.running), sizes, &settings.factors)?.factors.j_k()?)
 }
 
-fn noise_of(settings: &RunSettings, on: &ExcitedLoop, file: &Path) -> Result<Vec<f64>> {
+fn noise_of(settings: &RunSettings, on: &LoopToExcite, file: &Path) -> Result<Vec<f64>> {
     let data = &settings.data;
     let source = Source {
         path: file.to_owned(),

@@ -33,7 +33,7 @@ pub use finished::export::{
 };
 pub use finished::plot::{Plot, plot, plottable, write_plots};
 pub use finished::redraw::redraw;
-pub use folder::artefacts::{ModelFile, Provenance, SCHEMA};
+pub use folder::artefacts::{Provenance, RunModelFile, SCHEMA};
 pub use folder::write::{WrittenRun, write_into, write_run};
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;
@@ -46,7 +46,7 @@ pub use schema::{settings_schema, summary_schema};
 pub use settings::{
     AlternativeStructure, Cascade, CascadeGains, ControllerSettings, DataFile, DataSettings, Discretisation,
     DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
-    LoopGain, NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
+    LoopGain, NominalModel, ParallelPid, Polynomials, PredictionKind, RunSettings, TachoUnit, VerificationSettings,
     parse_table, tables_with,
 };
 pub use stages::certificate::RunCertificate;

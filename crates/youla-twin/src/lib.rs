@@ -11,9 +11,9 @@ mod serve;
 mod station;
 mod target;
 
-pub use demo::{Demo, Machine, demo};
+pub use demo::{Demo, DemoMachine, demo};
 pub use error::{Error, Result};
-pub use lock_step::{LockStep, LogRow};
+pub use lock_step::{LockStep, LoggedValues};
 pub use rig::BearingStructure;
 pub use running::{LoopDescription, RunningLoop, padded};
 pub use serve::{TwinPlant, serve_loop};

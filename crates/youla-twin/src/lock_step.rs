@@ -1,7 +1,7 @@
 //! Controller and twin in lock-step, and the log of the rows that the controller sends.
 
 use crate::error::failed;
-use crate::rig::{BearingRig, Rig};
+use crate::rig::{BearingRig, SimulatedRig};
 use crate::target::Target;
 use crate::{Error, Result};
 use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request, RowBlock, RowShape};
@@ -10,7 +10,7 @@ use youla_rt::{Phase, Status, Trip};
 const SHAPE: RowShape = RowShape { inputs: 2, outputs: 2 };
 
 /// A row: y, u, alpha, beta.
-pub type LogRow = [f64; 8];
+pub type LoggedValues = [f64; 8];
 
 /// The controller with the twin.
 pub struct LockStep {
@@ -21,7 +21,7 @@ pub struct LockStep {
     sequence: u32,
     reply: Option<(Outcome, Status)>,
     /// Rows since the last [`LockStep::take_rows`].
-    rows: Vec<LogRow>,
+    rows: Vec<LoggedValues>,
     status: Option<Status>,
     frame: Vec<u8>,
     next: u64,
@@ -135,7 +135,7 @@ impl LockStep {
     }
 
     /// The rows since the last call.
-    pub fn take_rows(&mut self) -> Vec<LogRow> {
+    pub fn take_rows(&mut self) -> Vec<LoggedValues> {
         std::mem::take(&mut self.rows)
     }
 

@@ -1,6 +1,6 @@
 //! Twins that a host can talk to: the gas bearing at any level of fidelity, and any identified model, under the loop of a file.
 
-use crate::rig::{BearingRig, Fidelity, Rig, RigParameters};
+use crate::rig::{BearingRig, Fidelity, RigParameters, SimulatedRig};
 use crate::running::{LoopDescription, RunningLoop, padded};
 use crate::station::Q_STATES;
 use crate::{Error, Result};

@@ -8,8 +8,8 @@ use youla::signal::Channel;
 use youla::{Mat, MatRef};
 use youla_io::export::{LoopExport, ObserverData, c_loop};
 use youla_rt::{
-    Cause, Controller, Excitation, ExcitedLoop, Limits, LoopRefusal, Matrices, Multisine, Prbs, QCoefficients,
-    QRefusal, Table, Tone,
+    Cause, Controller, ExcitationSource, ExcitedLoop, Limits, LoopRefusal, Matrices, MultisineSource, PrbsSource,
+    QCoefficients, QRefusal, TableSource, Tone,
 };
 
 const SAMPLES: usize = 200_000;
@@ -119,12 +119,14 @@ macro_rules! played {
             duration: 60,
         };
         let mut running = ExcitedLoop::<$real, 3, 2, 3, ORDER_OF_Q>::new(controller, limits, 25).unwrap();
-        let mut prbs: Excitation<'_, $real, 2, 0> = Excitation::Prbs(Prbs::new(10, 2, [1, 77], [0.5, 0.75]).unwrap());
+        let mut prbs: ExcitationSource<'_, $real, 2, 0> =
+            ExcitationSource::Prbs(PrbsSource::new(10, 2, [1, 77], [0.5, 0.75]).unwrap());
         let angle = core::f64::consts::TAU * 3.0 / 50.0;
         let tone = Tone { cosine: of(angle.cos()), sine: of(angle.sin()), gains: [[0.5, 0.0], [0.0, 0.25]] };
-        let mut multisine: Excitation<'_, $real, 2, 1> = Excitation::Multisine(Multisine::new([tone], 50));
+        let mut multisine: ExcitationSource<'_, $real, 2, 1> =
+            ExcitationSource::Multisine(MultisineSource::new([tone], 50));
         let rows = [[0.25, 0.0], [0.0, -0.125], [-0.25, 0.125]];
-        let mut table: Excitation<'_, $real, 2, 0> = Excitation::Table(Table::new(&rows));
+        let mut table: ExcitationSource<'_, $real, 2, 0> = ExcitationSource::Table(TableSource::new(&rows));
         let mut script = format!("{:x} {:x}\n", tone.cosine.to_bits(), tone.sine.to_bits());
         let (mut expected, mut seen) = (String::new(), BTreeSet::new());
         let (mut random, mut x) = (Random(7), [0.0_f64; 3]);

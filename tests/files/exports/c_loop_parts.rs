@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-use youla_rt::{Controller, Excitation, ExcitedLoop, Limits, Matrices, Prbs};
+use youla_rt::{Controller, ExcitationSource, ExcitedLoop, Limits, Matrices, PrbsSource};
 
 const STRICT: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off"];
 
@@ -52,10 +52,10 @@ fn registers() -> String {
     for order in 0..32 {
         let last = (1_u32 << order) - 1;
         for (hold, starts) in (0..).zip([[1, last], [0, 1], [1, 0], [1, last + 1]]) {
-            let prbs = Prbs::new(order, hold, starts, [1.0, 2.0]);
+            let prbs = PrbsSource::new(order, hold, starts, [1.0, 2.0]);
             let _ = write!(found, "{}", u8::from(prbs.is_some()));
             let Some(prbs) = prbs else { continue };
-            let mut source: Excitation<'_, f64, 2, 0> = Excitation::Prbs(prbs);
+            let mut source: ExcitationSource<'_, f64, 2, 0> = ExcitationSource::Prbs(prbs);
             for _ in 0..500 {
                 let [a, b] = source.advance();
                 let _ = write!(found, "{}", a + b + 3.0);

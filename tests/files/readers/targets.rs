@@ -11,10 +11,10 @@ use youla_io::{
     ChannelRef, CsvOptions, DecimalSign, TimeSource, Variables, csv_from_bytes, mat_from_bytes, npz_from_bytes,
 };
 use youla_link::{Frame, Kind, LARGEST_FRAME, PacketReader, Reply, Request, RowBlock};
-use youla_paper::study::{PaperSettings, Row};
+use youla_paper::study::{PaperSettings, StudyRow};
 use youla_report::{ReportData, html};
 use youla_rig::{Description, Recorder, rotor};
-use youla_run::{ModelFile, RunSettings};
+use youla_run::{RunModelFile, RunSettings};
 use youla_twin::rig::RigParameters;
 
 /// A reader and its name, which is that of its fuzz target and of its folder of seeds.
@@ -115,7 +115,7 @@ pub(crate) fn structure(bytes: &[u8]) {
 
 /// A line of the results of the study.
 pub(crate) fn row(bytes: &[u8]) {
-    let _ = Row::parse(&String::from_utf8_lossy(bytes));
+    let _ = StudyRow::parse(&String::from_utf8_lossy(bytes));
 }
 
 /// The options of the check of data, which are read from a file.
@@ -134,7 +134,7 @@ pub(crate) fn report_json(bytes: &[u8]) {
 
 /// A model as an artefact.
 pub(crate) fn model_json(bytes: &[u8]) {
-    let _ = serde_json::from_slice::<ModelFile<SubspaceOptions>>(bytes);
+    let _ = serde_json::from_slice::<RunModelFile<SubspaceOptions>>(bytes);
 }
 
 /// A new controller, its system and its source.

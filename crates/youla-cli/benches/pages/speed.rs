@@ -12,7 +12,7 @@ use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::lti::{frequency_response, simulate};
 use youla_run::{Identification, StageClock, identify, write_run};
 use youla_twin::rig::{Bearing, degraded};
-use youla_twin::{Machine, demo};
+use youla_twin::{DemoMachine, demo};
 
 /// Errors of all crates.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
@@ -71,7 +71,7 @@ fn stages() -> Result<String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bench-pages");
     let mut runs = Vec::new();
     for _ in 0..5 {
-        let demo = demo(Machine::Bearing, 1)?;
+        let demo = demo(DemoMachine::Bearing, 1)?;
         let mut announce = |_| {};
         let mut clock = StageClock::new(&mut announce);
         let found: Identification = identify(demo.settings, demo.records, Path::new("."), &mut clock)?;

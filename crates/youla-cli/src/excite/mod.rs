@@ -7,7 +7,7 @@ use crate::run_folder::{folder_of, place};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use youla_io::export::SequenceFormat;
-use youla_loop::excite::{ExciteOptions, InputOrder, Length, Notch, Shape};
+use youla_loop::excite::{ExcitationNotch, ExciteOptions, InputOrder, Length, Shape};
 use youla_run::{ExcitationPort, RunSettings, excite_run, write_excitation};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -182,7 +182,7 @@ fn options(args: &ExciteArgs) -> Result<ExciteOptions, Failure> {
         },
         seed: args.seed,
         ramp: args.ramp,
-        notch: speed.map(|hz| Notch { width: args.notch_width, ..Notch::at(hz) }),
+        notch: speed.map(|hz| ExcitationNotch { width: args.notch_width, ..ExcitationNotch::at(hz) }),
         inputs: if args.one_at_a_time { InputOrder::OneAtATime } else { InputOrder::Together },
         periods: args.periods,
         limit_input: args.limit_input.clone(),

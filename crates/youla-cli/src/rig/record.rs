@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use youla_io::require_free_for_settings;
 use youla_rig::{
-    Answer, CsvLog, Error, LogReport, Outcome, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings,
+    Answer, CsvLog, Error, LogReport, Outcome, Phase, PlotStream, Recorder, Request, Rig, RowSink, SequenceOrigin,
+    settings,
 };
 
 pub(super) const RECORD_EXAMPLE: &str = "\
@@ -70,7 +71,7 @@ pub(super) fn record(form: Form, args: &RecordArgs) -> Result<(), Failure> {
 }
 
 pub(super) fn excite(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
-    let source = if args.own { Source::Own } else { Source::Prbs { order: 18, hold: args.hold } };
+    let source = if args.own { SequenceOrigin::Own } else { SequenceOrigin::Prbs { order: 18, hold: args.hold } };
     if !(args.amplitude > 0.0 && args.amplitude.is_finite()) {
         return Err(refused(format!("--amplitude is {}, but must be positive", args.amplitude)));
     }

@@ -8,7 +8,7 @@ use crate::record::{BetweenRecord, CampaignSummary, PointRecord};
 use std::f64::consts::TAU;
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace, frequency_response};
-use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel, Region};
+use youla_report::figure::{Area, Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 use youla_run::ModeEntry;
 
 /// Key of a point in figures.
@@ -50,7 +50,7 @@ pub(super) fn damping(summary: &CampaignSummary) -> Figure {
     let predicted = points().filter_map(|(x, point)| {
         let [low, high] = point.predicted?.bounds;
         let (x, low, high) = (vec![x - 0.12, x + 0.12], vec![low; 2], vec![high; 2]);
-        Some(Region { method: PREDICTED.into(), note: "99 %".into(), x, low, high })
+        Some(Area { method: PREDICTED.into(), note: "99 %".into(), x, low, high })
     });
     let count = summary.points.len() as f64;
     let curves = [
@@ -90,7 +90,7 @@ pub(super) fn campbell(campaign: &Campaign, summary: &CampaignSummary) -> Figure
         regions.extend(resonances(point).filter_map(|mode| {
             let [low, high] = mode.hz_interval?;
             let (x, low, high) = (vec![x - 0.01 * fastest, x + 0.01 * fastest], vec![low?; 2], vec![high?; 2]);
-            Some(Region { method: key(&point.name), note: "95 %".into(), x, low, high })
+            Some(Area { method: key(&point.name), note: "95 %".into(), x, low, high })
         }));
     }
     let order = |times: f64| Guide {

@@ -8,7 +8,7 @@ use crate::campaign::Campaign;
 use crate::record::{CampaignSummary, PointRecord, PointStatus};
 use crate::rehearse::LEVEL;
 use std::path::Path;
-use youla_report::data::{Method, Role};
+use youla_report::data::{DrawnMethod, MethodRole};
 use youla_report::story::{Block, Section, Story, section};
 use youla_report::story_html;
 
@@ -47,16 +47,18 @@ pub(crate) fn report(campaign: &Campaign, summary: &CampaignSummary, out: &Path)
     })?)
 }
 
-fn methods(summary: &CampaignSummary) -> Vec<Method> {
+fn methods(summary: &CampaignSummary) -> Vec<DrawnMethod> {
     let fixed = [
-        (BEFORE, "before", Role::Nominal),
-        (PREDICTED, "predicted", Role::Hansen),
-        (REACHED, "reached", Role::Recommended),
-        (HALFWAY, "halfway between points, reached", Role::Direct),
+        (BEFORE, "before", MethodRole::Nominal),
+        (PREDICTED, "predicted", MethodRole::Hansen),
+        (REACHED, "reached", MethodRole::Recommended),
+        (HALFWAY, "halfway between points, reached", MethodRole::Direct),
     ];
-    let fixed = fixed.into_iter().map(|(key, label, role)| Method::new(key, label, role));
-    let of_points = summary.points.iter().map(|p| Method::new(figures::key(&p.name), p.name.clone(), Role::Other));
-    let of_ways = summary.between.iter().map(|way| Method::new(figures::way_key(way), way.name(), Role::Other));
+    let fixed = fixed.into_iter().map(|(key, label, role)| DrawnMethod::new(key, label, role));
+    let of_points =
+        summary.points.iter().map(|p| DrawnMethod::new(figures::key(&p.name), p.name.clone(), MethodRole::Other));
+    let of_ways =
+        summary.between.iter().map(|way| DrawnMethod::new(figures::way_key(way), way.name(), MethodRole::Other));
     fixed.chain(of_points).chain(of_ways).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use super::{BEFORE, REACHED};
 use crate::record::{BetweenRecord, CampaignSummary, PointRecord, PointStatus};
-use youla_report::story::{Row, Table, plain};
+use youla_report::story::{Table, TableRow, plain};
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| format!("{v:.digits$}"))
@@ -32,7 +32,7 @@ pub(super) fn points(summary: &CampaignSummary) -> Table {
         "reached",
         "order of Q",
     ];
-    let row = |(place, point): (usize, &PointRecord)| Row {
+    let row = |(place, point): (usize, &PointRecord)| TableRow {
         method: if point.reached.is_some() { REACHED } else { BEFORE }.into(),
         cells: vec![
             point.name.clone(),
@@ -60,7 +60,7 @@ pub(super) fn modes(summary: &CampaignSummary) -> Table {
     };
     let mut rows = Vec::new();
     for point in &summary.points {
-        rows.extend(point.modes.iter().map(|mode| Row {
+        rows.extend(point.modes.iter().map(|mode| TableRow {
             method: super::figures::key(&point.name),
             cells: vec![
                 point.name.clone(),
@@ -90,9 +90,9 @@ pub(super) fn between(summary: &CampaignSummary) -> Table {
         "reached halfway",
     ];
     let row = |way: &BetweenRecord| {
-        let of = |figure: fn(&crate::record::Evidence) -> f64| way.evidence.as_ref().map(figure);
+        let of = |figure: fn(&crate::record::ScheduleEvidence) -> f64| way.evidence.as_ref().map(figure);
         let small = |value: Option<f64>| value.map_or("-".into(), |v| format!("{v:.1e}"));
-        Row {
+        TableRow {
             method: super::figures::way_key(way),
             cells: vec![
                 way.name(),

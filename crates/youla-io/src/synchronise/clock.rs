@@ -7,7 +7,7 @@
 //! (Mardia and Jupp, Directional statistics, section 2.3), and sample i belongs to cycle round(t_i / T - phi). Gaussian scatter of standard deviation
 //! s T gives R = exp(-2 (pi s)^2).
 
-use super::{ChannelTiming, Role, StampedChannel, rows::Table};
+use super::{ChannelRole, ChannelTiming, StampedChannel, rows::Table};
 use std::f64::consts::TAU;
 use youla::c64;
 use youla::statistics::median;
@@ -120,7 +120,7 @@ pub(super) fn clocks(channels: &[StampedChannel], ts: f64) -> Result<Clocks, Str
         ));
     }
     let cycles = |c: &StampedChannel| c.times.iter().map(|t| (t - zero) / ts).collect::<Vec<f64>>();
-    let mut plant: Vec<&StampedChannel> = channels.iter().filter(|c| c.role != Role::External).collect();
+    let mut plant: Vec<&StampedChannel> = channels.iter().filter(|c| c.role != ChannelRole::External).collect();
     plant.sort_by_key(|c| std::cmp::Reverse(c.times.len()));
     let Some(reference) = plant.iter().find_map(|c| Phase::of(&cycles(c))) else {
         let steps = plant.iter().take(3).map(|c| format!("{:?} {}", c.channel.name, few(step(&c.times))));
@@ -138,16 +138,17 @@ pub(super) fn clocks(channels: &[StampedChannel], ts: f64) -> Result<Clocks, Str
     };
     let mut on: Vec<Option<OnClock>> = channels.iter().map(on).collect();
     let first = |role, on: &[Option<OnClock>]| (0..on.len()).find(|&c| channels[c].role == role && on[c].is_some());
-    let begin = first(Role::Output, &on).or(first(Role::Input, &on)).and_then(|c| on[c]).map_or(0.0, |o| o.phase);
-    let delays = |role: Role, low: f64, on: &mut [Option<OnClock>]| {
+    let begin =
+        first(ChannelRole::Output, &on).or(first(ChannelRole::Input, &on)).and_then(|c| on[c]).map_or(0.0, |o| o.phase);
+    let delays = |role: ChannelRole, low: f64, on: &mut [Option<OnClock>]| {
         let of_role = on.iter_mut().zip(channels).filter(|(_, c)| c.role == role);
         of_role.filter_map(|(o, _)| o.as_mut()).for_each(|o| o.delay = wrap(o.phase - begin, low));
     };
-    delays(Role::Output, -0.5, &mut on);
-    delays(Role::Input, -BEFORE, &mut on);
-    let input = first(Role::Input, &on).and_then(|c| on[c]).map_or(0.0, |o| o.delay);
+    delays(ChannelRole::Output, -0.5, &mut on);
+    delays(ChannelRole::Input, -BEFORE, &mut on);
+    let input = first(ChannelRole::Input, &on).and_then(|c| on[c]).map_or(0.0, |o| o.delay);
     // What comes from outside acts in the cycle whose input follows it.
-    delays(Role::External, input + BEFORE - 1.0, &mut on);
+    delays(ChannelRole::External, input + BEFORE - 1.0, &mut on);
     Ok(Clocks { zero, reference, begin, input, on })
 }
 

@@ -29,7 +29,7 @@ use youla::signal::{Channel, Record};
 
 /// What a channel is in the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum ChannelRole {
     /// Input of the plant, which the controller writes once in a cycle.
     Input,
     /// Measured output of the plant.
@@ -44,7 +44,7 @@ pub struct StampedChannel {
     /// Name and unit.
     pub channel: Channel,
     /// What it is in the loop.
-    pub role: Role,
+    pub role: ChannelRole,
     /// Whether a value is written only when it changes.
     pub changes_only: bool,
     /// Time stamps, seconds, not decreasing.
@@ -121,7 +121,7 @@ pub struct Synchronised {
 ///
 /// ```
 /// use youla::{lti::Discrete, signal::Channel};
-/// use youla_io::{Role, StampedChannel, synchronise};
+/// use youla_io::{ChannelRole, StampedChannel, synchronise};
 /// // An output at 100 Hz whose stamps scatter by 1 ms; the input is written 3 ms later.
 /// let scatter = |k: usize| 1e-3 * (k as f64 * 2.4).sin();
 /// let value = |k: usize, shift: f64| (0.3 * k as f64 + shift).sin() + 0.1 * (1.7 * k as f64).cos();
@@ -132,7 +132,7 @@ pub struct Synchronised {
 ///     times: (0..500).map(|k| 0.01 * k as f64 + late + scatter(k)).collect(),
 ///     values: (0..500).map(|k| value(k, late)).collect(),
 /// };
-/// let channels = [of("u", Role::Input, 3e-3), of("y", Role::Output, 0.0)];
+/// let channels = [of("u", ChannelRole::Input, 3e-3), of("y", ChannelRole::Output, 0.0)];
 /// let log = synchronise("log", &channels, Discrete::new(0.01)?)?;
 /// assert_eq!(log.records[0].samples(), 500);
 /// assert_eq!(log.records[0].column("y")?[7], value(7, 0.0));
@@ -141,9 +141,9 @@ pub struct Synchronised {
 /// ```
 pub fn synchronise(name: &str, channels: &[StampedChannel], time: Discrete) -> Result<Synchronised> {
     let refuse = |problem: String| Error::Clock { what: name.to_owned(), problem };
-    for role in [Role::Input, Role::Output] {
+    for role in [ChannelRole::Input, ChannelRole::Output] {
         if !channels.iter().any(|c| c.role == role) {
-            let word = if role == Role::Input { "input" } else { "output" };
+            let word = if role == ChannelRole::Input { "input" } else { "output" };
             return Err(refuse(format!("no channel is an {word}; name at least one")));
         }
     }

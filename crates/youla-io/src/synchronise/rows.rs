@@ -1,7 +1,7 @@
 //! One row for each cycle of the controller.
 
 use super::clock::{Clocks, few, step};
-use super::{Placement, Role, StampedChannel, interpolate};
+use super::{ChannelRole, Placement, StampedChannel, interpolate};
 
 /// A channel may miss this many cycles in a row; more are a gap, at which the record is cut.
 const LONGEST_FILL: usize = 8;
@@ -123,8 +123,8 @@ fn placed(channel: &StampedChannel, c: usize, clocks: &Clocks, ts: f64) -> Resul
     let name = &channel.channel.name;
     let Some(on) = clocks.on[c] else {
         return match channel.role {
-            Role::External => Ok(Placed::LastValue),
-            Role::Output if !channel.changes_only => interpolated(channel, ts),
+            ChannelRole::External => Ok(Placed::LastValue),
+            ChannelRole::Output if !channel.changes_only => interpolated(channel, ts),
             _ => Err(format!(
                 "{name:?} does not follow the sample time of {ts} s (median step {} s): what the machine did between its samples is not in the \
                  log; log it in each cycle of the controller",
@@ -150,9 +150,9 @@ fn placed(channel: &StampedChannel, c: usize, clocks: &Clocks, ts: f64) -> Resul
     }
     match channel.role {
         _ if within <= MOST_MISSING && paused as f64 <= 0.9 * span => Ok(Placed::Sampled(cycles)),
-        Role::Output => interpolated(channel, ts),
-        Role::External => Ok(Placed::LastValue),
-        Role::Input => Err(format!(
+        ChannelRole::Output => interpolated(channel, ts),
+        ChannelRole::External => Ok(Placed::LastValue),
+        ChannelRole::Input => Err(format!(
             "{name:?} has a sample in {:.0} % of the cycles of {ts} s (median step {} s); state the sample time of the controller, or that the \
              channel is written only when it changes, or log it in each cycle",
             100.0 * (1.0 - missing),

@@ -25,7 +25,7 @@ fn truth(n: usize, rng: &mut ChaCha8Rng) -> [Vec<f64>; 3] {
     columns
 }
 
-const ROLES: [Role; 3] = [Role::Input, Role::Output, Role::External];
+const ROLES: [ChannelRole; 3] = [ChannelRole::Input, ChannelRole::Output, ChannelRole::External];
 
 /// The log of the truth: each channel with its own delay, scatter of the stamps, and share of dropped samples.
 fn logged(
@@ -138,7 +138,7 @@ fn an_output_of_another_clock_is_interpolated() {
     let times: Vec<f64> = (0..11_000).map(|k| 7.0 + 0.000_93 * k as f64).collect();
     let values = times.iter().map(|t| wave(*t)).collect();
     let channel = Channel::new("gyro", "");
-    channels.push(StampedChannel { channel, role: Role::Output, changes_only: false, times, values });
+    channels.push(StampedChannel { channel, role: ChannelRole::Output, changes_only: false, times, values });
     let found = of(&channels).unwrap();
     let (record, timing) = (&found.records[0], &found.timing[3]);
     assert_eq!((timing.placement, timing.delay), (Placement::Interpolated, None));
@@ -164,7 +164,7 @@ fn what_cannot_be_brought_to_one_clock_is_refused_with_the_remedy() {
         c.times = c.times.iter().copied().step_by(step).collect();
         c.values = c.values.iter().copied().step_by(step).collect();
     };
-    refused(&|c| c[0].role = Role::Output, TS, &["no channel is an input"]);
+    refused(&|c| c[0].role = ChannelRole::Output, TS, &["no channel is an input"]);
     refused(&|_| (), 0.0031, &["no output follows the sample time of 0.0031 s", "\"y\" 0.0025"]);
     refused(&|_| (), 0.00125, &["\"u\" has a sample in 50 % of the cycles", "sample time of the controller"]);
     refused(&|_| (), 0.005, &["no input and no output follows"]);
@@ -219,7 +219,8 @@ fn any_channels_end_in_records_or_a_sentence() {
             times.sort_by(f64::total_cmp);
             let values =
                 times.iter().map(|_| rng.random_range(-3..4) as f64 * 10f64.powi(rng.random_range(-3..2))).collect();
-            let role = [Role::Input, Role::Output, Role::External][if c < 2 { c } else { rng.random_range(0..3) }];
+            let role = [ChannelRole::Input, ChannelRole::Output, ChannelRole::External]
+                [if c < 2 { c } else { rng.random_range(0..3) }];
             let changes_only = rng.random_range(0..4) == 0;
             StampedChannel { channel: Channel::new(format!("c{c}"), ""), role, changes_only, times, values }
         };

@@ -18,7 +18,7 @@ const GUARD: u32 = 2;
 const DEPTH: usize = 8;
 
 const ARM: Request<'_> = Request::Arm;
-const START: Request<'_> = Request::Start { source: Source::Prbs { order: 3, hold: 1 }, amplitude: 0.0 };
+const START: Request<'_> = Request::Start { source: SequenceOrigin::Prbs { order: 3, hold: 1 }, amplitude: 0.0 };
 const ALIVE: Request<'_> = Request::Alive;
 const STOP: Request<'_> = Request::Stop;
 

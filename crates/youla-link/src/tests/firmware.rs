@@ -3,7 +3,7 @@
 #[path = "../../../../firmware/mps2-an386/src/machine.rs"]
 mod machine;
 
-use crate::{Frame, Kind, LARGEST_FRAME, Reply, Request, Source};
+use crate::{Frame, Kind, LARGEST_FRAME, Reply, Request, SequenceOrigin};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -136,7 +136,9 @@ fn request_at(sample: u64) -> Option<Vec<u8>> {
     let request = match step {
         _ if sample > 300_000 && !step.is_multiple_of(50_000) => return None,
         100 if sample < 100_000 => Request::Arm,
-        101 if sample < 100_000 => Request::Start { source: Source::Prbs { order: 15, hold: 2 }, amplitude: 0.5 },
+        101 if sample < 100_000 => {
+            Request::Start { source: SequenceOrigin::Prbs { order: 15, hold: 2 }, amplitude: 0.5 }
+        }
         1000 => Request::BeginQ,
         1001 => Request::WriteQ { place: 0, values: &values },
         1002 => Request::CommitQ(q(gain).checksum()),

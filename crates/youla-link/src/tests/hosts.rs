@@ -7,7 +7,7 @@ use youla_rt::{Cause, Phase};
 
 type Two = Station<'static, 2, 2, 2, 2>;
 
-const START: Request<'_> = Request::Start { source: Source::Prbs { order: 7, hold: 2 }, amplitude: 0.1 };
+const START: Request<'_> = Request::Start { source: SequenceOrigin::Prbs { order: 7, hold: 2 }, amplitude: 0.1 };
 /// Of `station`.
 const LIFE: u32 = 9;
 

@@ -30,7 +30,7 @@ fn signed(key: &Key, frame: &[u8]) -> Vec<u8> {
     bytes
 }
 
-const START: Request<'_> = Request::Start { source: Source::Prbs { order: 7, hold: 2 }, amplitude: 0.1 };
+const START: Request<'_> = Request::Start { source: SequenceOrigin::Prbs { order: 7, hold: 2 }, amplitude: 0.1 };
 
 /// RFC 4231, cases 1 to 4: their keys are shorter than 32 bytes, which zeros change in nothing.
 #[test]

@@ -6,7 +6,7 @@
 //!
 //! The prediction contains the excitation alone. Noise, unbalance and the operating point add to it.
 
-use super::ExcitedLoop;
+use super::LoopToExcite;
 use super::options::ExciteOptions;
 use crate::error::{Error, Result};
 use faer::Scale;
@@ -44,7 +44,7 @@ pub struct ModelErrorEffect {
 }
 
 /// The loop of a plant with the controller; alpha and output noise to u and y.
-pub(super) fn loop_of(plant: &StateSpace<Discrete>, on: &ExcitedLoop) -> Result<StateSpace<Discrete>> {
+pub(super) fn loop_of(plant: &StateSpace<Discrete>, on: &LoopToExcite) -> Result<StateSpace<Discrete>> {
     let closed = closed_loop(plant, on.controller)?;
     let seen = plant.inputs() + plant.outputs();
     let closed = closed.part(0..seen, 0..closed.inputs());
@@ -86,7 +86,7 @@ impl Response {
 
 /// The prediction for models with the relative error theta.
 pub(super) fn model_error(
-    on: &ExcitedLoop,
+    on: &LoopToExcite,
     alpha: MatRef<'_, f64>,
     options: &ExciteOptions,
 ) -> Result<ModelErrorEffect> {

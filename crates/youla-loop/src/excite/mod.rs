@@ -32,7 +32,7 @@ mod tests;
 pub use guard::ModelErrorEffect;
 pub use information::ModeAccuracy;
 pub use noise::output_noise;
-pub use options::{ExciteOptions, InputOrder, Length, Notch, Shape};
+pub use options::{ExcitationNotch, ExciteOptions, InputOrder, Length, Shape};
 pub use summary::{ExcitedInput, ExcitedSummary, NotchEnergy, PredictedPeak};
 
 use crate::error::{Error, Result};
@@ -46,7 +46,7 @@ use youla::signal::Channel;
 
 /// The loop that is to be excited.
 #[derive(Debug, Clone, Copy)]
-pub struct ExcitedLoop<'a> {
+pub struct LoopToExcite<'a> {
     /// The nominal model, m inputs and p outputs.
     pub nominal: &'a StateSpace<Discrete>,
     /// The controller with its port, `(y, alpha)` to `(u, ..)`: `J_K`, or a controller from
@@ -81,13 +81,13 @@ pub struct Excited {
 ///
 /// ```
 /// use youla::control::with_input_port;
-/// use youla_loop::excite::{ExcitedLoop, ExciteOptions, Length, excite};
+/// use youla_loop::excite::{LoopToExcite, ExciteOptions, Length, excite};
 /// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, signal::Channel};
 /// let time = Discrete::new(1e-3)?;
 /// let nominal = StateSpace::new(eye(1), eye(1), eye(1), Mat::zeros(1, 1), time)?;
 /// let controller = with_input_port(&StateSpace::gain(Mat::from_fn(1, 1, |_, _| -0.1), time)?)?;
 /// let (inputs, outputs) = ([Channel::new("u", "V")], [Channel::new("y", "um")]);
-/// let on = ExcitedLoop { nominal: &nominal, controller: &controller, inputs: &inputs, outputs: &outputs };
+/// let on = LoopToExcite { nominal: &nominal, controller: &controller, inputs: &inputs, outputs: &outputs };
 /// let options = ExciteOptions {
 ///     amplitude: vec![1.0],
 ///     band: [5.0, 50.0],
@@ -100,7 +100,7 @@ pub struct Excited {
 /// assert!((found.summary.predicted[1].peak - 3.0).abs() < 1e-9);
 /// # Ok::<(), youla_loop::Error>(())
 /// ```
-pub fn excite(on: &ExcitedLoop, options: &ExciteOptions) -> Result<Excited> {
+pub fn excite(on: &LoopToExcite, options: &ExciteOptions) -> Result<Excited> {
     let (time, m, p) = (on.nominal.time(), on.nominal.inputs(), on.nominal.outputs());
     for (what, expected, found) in [("input", m, on.inputs.len()), ("output", p, on.outputs.len())] {
         if expected != found {
@@ -165,7 +165,7 @@ fn limits(options: &ExciteOptions, m: usize, p: usize) -> Result<[Option<Vec<f64
 
 /// The largest factor that keeps all limits, if one is exceeded.
 fn keep(
-    on: &ExcitedLoop,
+    on: &LoopToExcite,
     options: &ExciteOptions,
     peaks: &[Vec<f64>; 2],
     limits: &[Option<Vec<f64>>; 2],

@@ -4,7 +4,7 @@
 //! var(y_i) = sum over j of |S_ij|_2^2 sigma_j^2        S the output sensitivity, n to y
 //! ```
 
-use super::ExcitedLoop;
+use super::LoopToExcite;
 use super::guard::loop_of;
 use crate::error::{Error, Result};
 use youla::linalg::solve;
@@ -18,7 +18,7 @@ use youla::{Mat, MatRef};
 /// # Errors
 /// [`youla::Error::Shape`]; [`youla::Error::NotStabilising`]; [`youla::Error::OutOfRange`] for an output whose variance the noise of the others would
 /// exceed: the record is not that of output noise in this loop.
-pub fn output_noise(on: &ExcitedLoop, y: MatRef<'_, f64>) -> Result<Vec<f64>> {
+pub fn output_noise(on: &LoopToExcite, y: MatRef<'_, f64>) -> Result<Vec<f64>> {
     let (m, p) = (on.nominal.inputs(), on.nominal.outputs());
     youla::linalg::check_shape("the record without excitation", y, (y.nrows().max(2), p))?;
     let closed = loop_of(on.nominal, on)?;

@@ -54,7 +54,7 @@ pub enum InputOrder {
 /// Frequency bands without excitation, around multiples of the shaft speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Notch {
+pub struct ExcitationNotch {
     /// The speed, Hz.
     pub hz: f64,
     /// Width of each band, Hz: from half of it below to half of it above.
@@ -73,10 +73,10 @@ fn usual_harmonics() -> Vec<u32> {
     vec![1, 2]
 }
 
-impl Notch {
+impl ExcitationNotch {
     /// Around once and twice a speed in Hz, 4 Hz wide.
     pub fn at(hz: f64) -> Self {
-        Notch { hz, width: usual_width(), harmonics: usual_harmonics() }
+        ExcitationNotch { hz, width: usual_width(), harmonics: usual_harmonics() }
     }
 
     /// The bands, lowest and highest frequency in Hz.
@@ -103,7 +103,7 @@ pub struct ExciteOptions {
     /// Time in seconds in which the amplitude grows linearly at the start, and falls at the end.
     pub ramp: f64,
     /// Bands around the shaft speed without excitation; none when absent.
-    pub notch: Option<Notch>,
+    pub notch: Option<ExcitationNotch>,
     /// How several inputs are excited.
     pub inputs: InputOrder,
     /// Periods of a multisine or PRBS within the length, or within the part of one input. One period has the densest lines; several periods

@@ -5,7 +5,7 @@
 //! raised cosine between. The filter looks ahead, which a sequence that is made before the experiment may; a binary sequence is no
 //! longer binary behind it, and is scaled so that its greatest absolute value is the amplitude again.
 
-use super::options::{ExciteOptions, InputOrder, Notch, Shape, check, spread};
+use super::options::{ExcitationNotch, ExciteOptions, InputOrder, Shape, check, spread};
 use crate::error::Result;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -94,7 +94,7 @@ fn excitation(options: &ExciteOptions, length: usize, time: Discrete) -> Result<
             // Twice the resolution of the record beyond the edges: so wide is a line.
             let guard = 2.0 / (length as f64 * ts);
             let wider = |[low, high]: [f64; 2]| [TAU * (low - guard), TAU * (high + guard)];
-            let omitted = options.notch.iter().flat_map(Notch::bands).map(wider).collect();
+            let omitted = options.notch.iter().flat_map(ExcitationNotch::bands).map(wider).collect();
             let sines =
                 Multisine { period, omega_min: TAU * low, omega_max: Some(TAU * high), omitted, amplitude: 1.0 };
             let spacing = 1.0 / (period as f64 * ts);
@@ -119,7 +119,7 @@ fn independence(shape: Shape, m: usize, in_turn: bool) -> String {
 }
 
 /// Takes the bands out of every channel and scales it to a greatest absolute value of 1.
-fn without_bands(signal: &mut Mat<f64>, notch: &Notch, time: Discrete) {
+fn without_bands(signal: &mut Mat<f64>, notch: &ExcitationNotch, time: Discrete) {
     let n = signal.nrows();
     let mut planner = FftPlanner::new();
     let (forward, back) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
@@ -139,7 +139,7 @@ fn without_bands(signal: &mut Mat<f64>, notch: &Notch, time: Discrete) {
 }
 
 /// The filter at a frequency in Hz.
-fn gain(notch: &Notch, hz: f64) -> f64 {
+fn gain(notch: &ExcitationNotch, hz: f64) -> f64 {
     let one = |harmonic: &u32| {
         let beyond = ((hz - f64::from(*harmonic) * notch.hz).abs() - notch.width / 2.0) / (notch.width / 2.0);
         0.5 - 0.5 * (PI * beyond.clamp(0.0, 1.0)).cos()

@@ -2,7 +2,7 @@
 
 use super::energy::Energy;
 use super::guard::Response;
-use super::{ExciteOptions, ExcitedLoop, ModeAccuracy, ModelErrorEffect, Notch};
+use super::{ExcitationNotch, ExciteOptions, LoopToExcite, ModeAccuracy, ModelErrorEffect};
 use serde::Serialize;
 use youla::Mat;
 use youla::signal::Channel;
@@ -96,7 +96,7 @@ pub(super) fn needed(modes: &mut [ModeAccuracy], wanted: Option<f64>, duration: 
 }
 
 pub(super) fn inputs(
-    on: &ExcitedLoop,
+    on: &LoopToExcite,
     alpha: &Mat<f64>,
     energies: &[Energy],
     options: &ExciteOptions,
@@ -116,11 +116,11 @@ pub(super) fn notches(energies: &[Energy], options: &ExciteOptions) -> Vec<Notch
         share: energies.iter().map(|e| e.share(band)).collect(),
         decibels: energies.iter().map(|e| Some(e.decibels(band, options.band)).filter(|d| d.is_finite())).collect(),
     };
-    options.notch.iter().flat_map(Notch::bands).map(one).collect()
+    options.notch.iter().flat_map(ExcitationNotch::bands).map(one).collect()
 }
 
 pub(super) fn predicted(
-    on: &ExcitedLoop,
+    on: &LoopToExcite,
     response: &Response,
     limits: &[Option<Vec<f64>>; 2],
     wrong: &ModelErrorEffect,

@@ -34,9 +34,9 @@ fn plant(gain: f64) -> Plant {
 }
 
 impl Plant {
-    fn on(&self) -> ExcitedLoop<'_> {
+    fn on(&self) -> LoopToExcite<'_> {
         let [inputs, outputs] = &self.channels;
-        ExcitedLoop { nominal: &self.nominal, controller: &self.controller, inputs, outputs }
+        LoopToExcite { nominal: &self.nominal, controller: &self.controller, inputs, outputs }
     }
 }
 
@@ -74,7 +74,7 @@ fn the_bands_around_the_speed_are_free() {
     let plant = plant(-0.3);
     for shape in Shape::ALL {
         let length = Length::Samples(20000);
-        let with = ExciteOptions { notch: Some(Notch::at(1500.0 / 60.0)), length, ramp: 1.0, ..usual(shape) };
+        let with = ExciteOptions { notch: Some(ExcitationNotch::at(1500.0 / 60.0)), length, ramp: 1.0, ..usual(shape) };
         let found = excite(&plant.on(), &with).unwrap();
         assert_eq!(found.summary.notches.len(), 2);
         let least = if shape == Shape::Multisine { -25.0 } else { -45.0 };
@@ -87,7 +87,7 @@ fn the_bands_around_the_speed_are_free() {
     }
     // Whole periods without a ramp have no line there at all.
     let lines = ExciteOptions {
-        notch: Some(Notch::at(25.0)),
+        notch: Some(ExcitationNotch::at(25.0)),
         ramp: 0.0,
         length: Length::Samples(4000),
         ..usual(Shape::Multisine)
@@ -107,7 +107,7 @@ fn inputs_are_kept_apart() {
     let nominal = StateSpace::gain(eye(2), time).unwrap();
     let controller = with_input_port(&StateSpace::gain(Mat::zeros(2, 2), time).unwrap()).unwrap();
     let channels = [Channel::new("a", "V"), Channel::new("b", "V")];
-    let on = ExcitedLoop { nominal: &nominal, controller: &controller, inputs: &channels, outputs: &channels };
+    let on = LoopToExcite { nominal: &nominal, controller: &controller, inputs: &channels, outputs: &channels };
     let of = |options: ExciteOptions| excite(&on, &options).unwrap();
     let together = of(ExciteOptions { ramp: 0.0, ..usual(Shape::Multisine) });
     let (a, b) = (together.alpha.col(0), together.alpha.col(1));
@@ -176,7 +176,7 @@ fn options_without_a_meaning_are_refused() {
         ExciteOptions { noise: vec![0.0], ..ok() },
         ExciteOptions { damping_deviation: Some(1e-3), ..ok() },
         ExciteOptions { limit_output: vec![1.0, 2.0], ..ok() },
-        ExciteOptions { notch: Some(Notch::at(0.0)), ..ok() },
+        ExciteOptions { notch: Some(ExcitationNotch::at(0.0)), ..ok() },
         ExciteOptions { shape: Shape::Prbs, band: [1e-9, 100.0], ..ok() },
     ];
     for options in cases {

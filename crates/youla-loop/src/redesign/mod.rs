@@ -23,7 +23,7 @@ pub use robust::DeviationRegion;
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use structured::{PidOptions, Structure};
+use structured::{ControllerStructure, PidOptions};
 use youla::control::{ChannelScales, closed_loop, margins, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::{Interval, Region};
@@ -76,7 +76,7 @@ pub struct RedesignOptions {
     pub band: BandOptions,
     /// A fixed structure in which the controller is designed, in place of `method`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub structure: Option<Structure>,
+    pub structure: Option<ControllerStructure>,
     /// Parts and limits of a PID, for `structure = "pid"`.
     #[serde(skip_serializing_if = "PidOptions::is_default")]
     pub pid: PidOptions,

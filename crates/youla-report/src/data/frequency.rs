@@ -7,7 +7,7 @@ use crate::numbers;
 /// Frequency responses of all models on one grid, and the measured ones on theirs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct FrequencyResponse {
+pub struct DrawnResponses {
     /// Grid of the models, Hz, rising.
     #[serde(with = "numbers::seven_digits")]
     pub hz: Vec<f64>,
@@ -19,10 +19,10 @@ pub struct FrequencyResponse {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineLevels>,
     /// Bounds of magnitudes on the grid of the models.
-    pub bands: Vec<Band>,
+    pub bands: Vec<DrawnBand>,
     /// Standard deviation of the recommended response by its causes, per output and input.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub deviations: Vec<Deviation>,
+    pub deviations: Vec<DrawnDeviation>,
     /// Singular values of models with several inputs and outputs, on the grid of the models.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub singular: Vec<SingularValue>,
@@ -31,7 +31,7 @@ pub struct FrequencyResponse {
 /// Standard deviation of the response of the recommended model from one input to one output, in per cent of its magnitude.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Deviation {
+pub struct DrawnDeviation {
     /// Output, by its place.
     pub output: usize,
     /// Input, by its place.
@@ -50,7 +50,7 @@ pub struct Deviation {
     pub bands: Vec<[f64; 2]>,
 }
 
-/// The share of one cause in a [`Deviation`].
+/// The share of one cause in a [`DrawnDeviation`].
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DeviationPart {
@@ -120,7 +120,7 @@ pub struct SingularValue {
 
 /// Bounds of the response of one model from one input to one output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Band {
+pub struct DrawnBand {
     /// Key of the method.
     pub method: String,
     /// Output, by its place.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use youla::control::IsoZone;
 
-use super::{EvidenceTable, Method};
+use super::{DrawnMethod, EvidenceTable};
 use crate::figure::Figure;
 
 /// The loop of one model with the controller that ran.
@@ -22,9 +22,9 @@ pub struct Certificate {
 
 /// A new controller beside the one that ran.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Redesign {
+pub struct DrawnRedesign {
     /// The present loop and the new one, by the keys that the figure uses.
-    pub loops: Vec<Method>,
+    pub loops: Vec<DrawnMethod>,
     /// Response of both loops to a disturbance at the plant input.
     pub figure: Figure,
     /// Modes of both loops, and the weights that were tried.
@@ -73,14 +73,14 @@ pub struct Robustness {
     /// Smallest delay margin of one channel, seconds.
     pub delay_margin_s: Option<f64>,
     /// Balanced disk margin of all inputs at once.
-    pub input_disk_margin: Option<DiskMargin>,
+    pub input_disk_margin: Option<DrawnDiskMargin>,
     /// Balanced disk margin of all outputs at once.
-    pub output_disk_margin: Option<DiskMargin>,
+    pub output_disk_margin: Option<DrawnDiskMargin>,
 }
 
 /// A balanced disk margin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct DiskMargin {
+pub struct DrawnDiskMargin {
     /// Its size.
     pub alpha: Option<f64>,
     /// Lowest factor on the gain that it allows.

@@ -44,7 +44,7 @@ pub struct ReportData {
     /// Options of the run as TOML.
     pub settings: String,
     /// Files that were read.
-    pub sources: Vec<Source>,
+    pub sources: Vec<SourceFile>,
     /// Input channels of the plant.
     pub inputs: Vec<Channel>,
     /// Output channels of the plant.
@@ -52,7 +52,7 @@ pub struct ReportData {
     /// Seconds between samples; absent where the models are in continuous time.
     pub sample_time: Option<f64>,
     /// Models that are compared, in the order in which they are listed and drawn.
-    pub methods: Vec<Method>,
+    pub methods: Vec<DrawnMethod>,
     /// Tables of a comparison of runs, shown first and in place of the verdict.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overview: Vec<EvidenceTable>,
@@ -78,11 +78,11 @@ pub struct ReportData {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residuals: Option<Residuals>,
     /// Frequency responses.
-    pub frequency: Option<FrequencyResponse>,
+    pub frequency: Option<DrawnResponses>,
     /// Poles of each model.
     pub poles: Vec<Poles>,
     /// Modes of each model.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<DrawnMode>,
     /// What is left out of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unlisted: Vec<UnlistedModes>,
@@ -93,7 +93,7 @@ pub struct ReportData {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub physical: Option<PhysicalEstimate>,
     /// Hankel singular values of the reduction.
-    pub reduction: Option<Reduction>,
+    pub reduction: Option<DrawnReduction>,
     /// Loop certificate of each model.
     pub certificates: Vec<Certificate>,
     /// Further evidence on the loop, below the certificates.
@@ -104,7 +104,7 @@ pub struct ReportData {
     pub recommended: Vec<EvidenceTable>,
     /// A new controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub redesign: Option<Redesign>,
+    pub redesign: Option<DrawnRedesign>,
     /// Margins of each model in its loop, and distances between models.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub margins: Vec<LoopMargins>,
@@ -114,12 +114,12 @@ pub struct ReportData {
     /// Relative residual of the Bezout identity of the factors.
     pub bezout_residual: Option<f64>,
     /// Duration of each stage.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageTime>,
 }
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Source {
+pub struct SourceFile {
     /// Path as the user gave it.
     pub path: String,
     /// What it was used for, for example "estimation".
@@ -131,7 +131,7 @@ pub struct Source {
 /// What a model is in the comparison. It decides colour and marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Role {
+pub enum MethodRole {
     /// The model that the run recommends.
     Recommended,
     /// The model known before.
@@ -154,60 +154,60 @@ pub enum Role {
 
 /// A model that is compared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Method {
+pub struct DrawnMethod {
     /// Key by which the other structs name it.
     pub key: String,
     /// Name that figures and tables show.
     pub label: String,
     /// Its role.
-    pub role: Role,
+    pub role: MethodRole,
 }
 
-impl Method {
+impl DrawnMethod {
     /// A method under any key and label.
-    pub fn new(key: impl Into<String>, label: impl Into<String>, role: Role) -> Self {
-        Method { key: key.into(), label: label.into(), role }
+    pub fn new(key: impl Into<String>, label: impl Into<String>, role: MethodRole) -> Self {
+        DrawnMethod { key: key.into(), label: label.into(), role }
     }
 
     /// `nominal`: the model known before.
     pub fn nominal() -> Self {
-        Self::new("nominal", "nominal G(0)", Role::Nominal)
+        Self::new("nominal", "nominal G(0)", MethodRole::Nominal)
     }
 
     /// `pem`: grey-box prediction error, started at the nominal model.
     pub fn pem() -> Self {
-        Self::new("pem", "PEM", Role::Pem)
+        Self::new("pem", "PEM", MethodRole::Pem)
     }
 
     /// `pem_multi_start`: the same from several starts.
     pub fn pem_multi_start() -> Self {
-        Self::new("pem_multi_start", "PEM, several starts", Role::PemMultiStart)
+        Self::new("pem_multi_start", "PEM, several starts", MethodRole::PemMultiStart)
     }
 
     /// `direct`: N4SID on u and y.
     pub fn direct() -> Self {
-        Self::new("direct", "direct N4SID", Role::Direct)
+        Self::new("direct", "direct N4SID", MethodRole::Direct)
     }
 
     /// `hansen`: the model of the Hansen scheme, full order.
     pub fn hansen() -> Self {
-        Self::new("hansen", "Hansen G(S)", Role::Hansen)
+        Self::new("hansen", "Hansen G(S)", MethodRole::Hansen)
     }
 
     /// `hansen_reduced`: the same after reduction.
     pub fn hansen_reduced() -> Self {
-        Self::new("hansen_reduced", "Hansen reduced G_red(S)", Role::HansenReduced)
+        Self::new("hansen_reduced", "Hansen reduced G_red(S)", MethodRole::HansenReduced)
     }
 
     /// `hansen_pem`: prediction error, started at the projection of the Hansen model.
     pub fn hansen_pem() -> Self {
-        Self::new("hansen_pem", "PEM from Hansen", Role::HansenPem)
+        Self::new("hansen_pem", "PEM from Hansen", MethodRole::HansenPem)
     }
 }
 
 /// Duration of one stage of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Stage {
+pub struct StageTime {
     /// Its name.
     pub name: String,
     /// Seconds.

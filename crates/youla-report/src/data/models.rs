@@ -34,7 +34,7 @@ pub struct Poles {
 
 /// A mode of one model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Mode {
+pub struct DrawnMode {
     /// Key of the method.
     pub method: String,
     /// Natural frequency, Hz.
@@ -64,7 +64,7 @@ pub struct UnlistedModes {
 
 /// Hankel singular values of a model that was reduced, and the error at each order.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Reduction {
+pub struct DrawnReduction {
     /// What was reduced and how, for example "G(S) by balanced truncation".
     pub label: String,
     /// Hankel singular values, falling.
@@ -119,7 +119,7 @@ mod tests {
     /// A pole at z = 0 has no finite frequency: a report with it is read again.
     #[test]
     fn numbers_that_do_not_exist_are_read_again() {
-        let mode = Mode {
+        let mode = DrawnMode {
             method: "hansen".into(),
             hz: f64::INFINITY,
             zeta: 1.0,
@@ -127,7 +127,7 @@ mod tests {
             residue: Vec::new(),
         };
         let poles = Poles { method: "hansen".into(), poles: vec![[0.0, f64::NAN]], zeros: vec![[f64::INFINITY, 0.0]] };
-        let again: Mode = serde_json::from_str(&serde_json::to_string(&mode).unwrap()).unwrap();
+        let again: DrawnMode = serde_json::from_str(&serde_json::to_string(&mode).unwrap()).unwrap();
         assert!(again.hz.is_nan() && again.zeta == 1.0 && again.deviation.unwrap()[1] == 0.1);
         let again: Poles = serde_json::from_str(&serde_json::to_string(&poles).unwrap()).unwrap();
         assert!(again.poles[0][1].is_nan() && again.zeros[0][0].is_nan());

@@ -78,12 +78,12 @@ pub struct VerifiedOutput {
     /// Measured output.
     pub measured: Trace,
     /// Predictions of the models.
-    pub predictions: Vec<Prediction>,
+    pub predictions: Vec<DrawnPrediction>,
 }
 
 /// Prediction of one output by one model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
+pub struct DrawnPrediction {
     /// Key of the method.
     pub method: String,
     /// Predicted output.
@@ -102,12 +102,12 @@ pub struct Residuals {
     /// Steps ahead of the fits.
     pub steps: Vec<usize>,
     /// One entry per method and record.
-    pub tests: Vec<ResidualTest>,
+    pub tests: Vec<DrawnResidualTest>,
 }
 
 /// Residual tests of one model on one record.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct ResidualTest {
+pub struct DrawnResidualTest {
     /// Name of the record.
     pub record: String,
     /// Key of the method.

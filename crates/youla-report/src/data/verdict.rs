@@ -37,7 +37,7 @@ pub enum ReportPart {
 /// Severity, ascending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Status {
+pub enum LineStatus {
     /// In order.
     Good,
     /// For information.
@@ -52,7 +52,7 @@ pub enum Status {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Severity.
-    pub status: Status,
+    pub status: LineStatus,
     /// One sentence.
     pub text: String,
     /// Where the report shows it.
@@ -63,7 +63,7 @@ pub struct Verdict {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// Severity of the remark.
-    pub status: Status,
+    pub status: LineStatus,
     /// One sentence.
     pub text: String,
 }
@@ -72,7 +72,7 @@ pub struct Note {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DataFinding {
     /// Severity; `Bad` where results would be wrong.
-    pub status: Status,
+    pub status: LineStatus,
     /// Which test.
     pub test: String,
     /// Name of the record.

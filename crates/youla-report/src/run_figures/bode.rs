@@ -4,8 +4,8 @@ use super::choice::Chosen;
 use super::deviation;
 use super::verification::channel;
 use super::{RunFigure, axis, choice, frequency_in_both_units, key, logarithmic, span};
-use crate::data::{Band, Deviation, FrequencyResponse, Indirect, LineLevels, ModelResponse};
-use crate::figure::{Axis, Content, Curve, Drawn, Figure, Panel, Region};
+use crate::data::{DrawnBand, DrawnDeviation, DrawnResponses, Indirect, LineLevels, ModelResponse};
+use crate::figure::{Area, Axis, Content, Curve, Drawn, Figure, Panel};
 use crate::pretty_unit;
 
 /// Coherence below which a point of the indirect response is said to carry little.
@@ -21,15 +21,15 @@ pub(super) struct Pair<'a> {
     pub(super) hz: &'a [f64],
     pub(super) models: Vec<&'a ModelResponse>,
     pub(super) indirect: Vec<&'a Indirect>,
-    pub(super) bands: Vec<&'a Band>,
+    pub(super) bands: Vec<&'a DrawnBand>,
     pub(super) lines: Option<&'a LineLevels>,
-    deviation: Option<&'a Deviation>,
+    deviation: Option<&'a DrawnDeviation>,
 }
 
 /// All pairs of a run that have a response, by output, then by input.
 pub(super) fn pairs(chosen: &Chosen, figure: RunFigure) -> Vec<Pair<'_>> {
     let Some(response) = &chosen.data.frequency else { return Vec::new() };
-    let FrequencyResponse { hz, models, indirect, bands, lines, deviations, .. } = response;
+    let DrawnResponses { hz, models, indirect, bands, lines, deviations, .. } = response;
     let mut places: Vec<(usize, usize)> = models.iter().map(|m| (m.output, m.input)).collect();
     places.extend(indirect.iter().map(|m| (m.output, m.input)));
     places.sort_unstable();
@@ -112,7 +112,7 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
     }
     text += &pair.deviation.map_or_else(String::new, deviation::caption);
     if let Some(band) = pair.bands.first() {
-        let name = |band: &&Band| {
+        let name = |band: &&DrawnBand| {
             let found = chosen.data.methods.iter().find(|method| method.key == band.method);
             found.map_or_else(|| band.method.clone(), |method| method.label.clone())
         };
@@ -136,12 +136,12 @@ pub(super) fn percent(level: f64) -> String {
 }
 
 /// Whether the lower bound is magnitude zero somewhere.
-fn open_below(band: &&Band) -> bool {
+fn open_below(band: &&DrawnBand) -> bool {
     band.low_db.iter().zip(&band.high_db).any(|(low, high)| low.is_nan() && high.is_finite())
 }
 
-fn region(pair: &Pair, band: &Band) -> Region {
-    Region {
+fn region(pair: &Pair, band: &DrawnBand) -> Area {
+    Area {
         method: band.method.clone(),
         note: percent(band.level),
         x: pair.hz.to_vec(),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::data::{ReportData, Role};
+use crate::data::{MethodRole, ReportData};
 use crate::phase;
 use crate::{Error, Result};
 use youla::signal::Channel;
@@ -128,7 +128,8 @@ fn keep_channels(data: &mut ReportData, output: Option<usize>, input: Option<usi
 
 fn align(data: &mut ReportData) {
     let methods = data.methods.clone();
-    let role = |key: &str| methods.iter().find(|method| method.key == key).map_or(Role::Other, |method| method.role);
+    let role =
+        |key: &str| methods.iter().find(|method| method.key == key).map_or(MethodRole::Other, |method| method.role);
     if let Some(frequency) = &mut data.frequency {
         phase::align(frequency, role);
     }

@@ -1,8 +1,8 @@
 //! The standard deviation of the recommended response with its causes, and the bands in which the response is valid.
 
 use super::{logarithmic, span};
-use crate::data::Deviation;
-use crate::figure::{Axis, Content, Curve, Panel, Region};
+use crate::data::DrawnDeviation;
+use crate::figure::{Area, Axis, Content, Curve, Panel};
 
 /// Key of the total, of a band, and of each cause: each has a style of its own, the same in every figure.
 const TOTAL: &str = "deviation, all causes";
@@ -16,11 +16,11 @@ const CAUSES: [(&str, &str); 4] = [
 ];
 
 /// Over the frequencies of the models; filled below the limit in each band of validity.
-pub(super) fn panel(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
+pub(super) fn panel(deviation: &DrawnDeviation, [first, last]: [f64; 2]) -> Panel {
     let places: Vec<usize> = (0..deviation.hz.len()).filter(|k| (first..=last).contains(&deviation.hz[*k])).collect();
     let kept = |values: &[f64]| -> Vec<f64> { places.iter().map(|k| values[*k]).collect() };
     let (hz, total) = (&kept(&deviation.hz), &kept(&deviation.total));
-    let Deviation { parts, limit, bands, .. } = deviation;
+    let DrawnDeviation { parts, limit, bands, .. } = deviation;
     let line = |key: String, y: &[f64]| Curve { method: key, x: hz.clone(), y: y.to_vec(), ..Curve::default() };
     let parts = parts.iter().map(|part| line(format!("deviation, {}", part.cause), &kept(&part.percent)));
     let floor = span(total.iter().copied().filter(|v| *v > 0.0)).map_or(0.1 * limit, |[low, _]| low.min(0.1 * limit));
@@ -34,9 +34,9 @@ pub(super) fn panel(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
     }
 }
 
-fn valid(hz: &[f64], bands: &[[f64; 2]], limit: f64) -> Region {
+fn valid(hz: &[f64], bands: &[[f64; 2]], limit: f64) -> Area {
     let within = |hz: &f64| bands.iter().any(|[low, high]| (*low..=*high).contains(hz));
-    Region {
+    Area {
         method: BAND.into(),
         note: format!("{limit} %"),
         x: hz.to_vec(),
@@ -46,7 +46,7 @@ fn valid(hz: &[f64], bands: &[[f64; 2]], limit: f64) -> Region {
 }
 
 /// What the panel shows, with what each cause in it is.
-pub(super) fn caption(deviation: &Deviation) -> String {
+pub(super) fn caption(deviation: &DrawnDeviation) -> String {
     let drawn = CAUSES.iter().filter(|(name, _)| deviation.parts.iter().any(|part| part.cause == *name));
     let causes: Vec<String> = drawn.map(|(name, what)| format!("{name}: {what}")).collect();
     let bands = match deviation.bands.is_empty() {

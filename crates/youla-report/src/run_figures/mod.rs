@@ -34,7 +34,7 @@ pub use choice::FigureChoice;
 
 use choice::Chosen;
 
-use super::data::{Method, ReportData};
+use super::data::{DrawnMethod, ReportData};
 use super::figure::{Axis, Figure, OtherUnit};
 use crate::Result;
 
@@ -145,7 +145,7 @@ pub struct RunDrawing {
     /// The figure; its key names its files.
     pub figure: Figure,
     /// As [`super::svg()`] and [`super::figure_csv`] take them.
-    pub methods: Vec<Method>,
+    pub methods: Vec<DrawnMethod>,
 }
 
 /// The figures that a run has.
@@ -195,7 +195,7 @@ fn drawings(chosen: &Chosen, kind: RunFigure) -> Vec<RunDrawing> {
 }
 
 fn redesign(chosen: &Chosen) -> Vec<RunDrawing> {
-    let drawing = |new: &super::data::Redesign| RunDrawing {
+    let drawing = |new: &super::data::DrawnRedesign| RunDrawing {
         figure: Figure { key: RunFigure::Redesign.key().into(), ..new.figure.clone() },
         methods: new.loops.clone(),
     };

@@ -5,7 +5,7 @@
 use super::bode::{FADED, Pair, is_clear, pairs, percent};
 use super::choice::Chosen;
 use super::{RunFigure, axis, choice, span};
-use crate::data::{Band, Indirect, ModelResponse};
+use crate::data::{DrawnBand, Indirect, ModelResponse};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 use std::f64::consts::TAU;
 
@@ -104,7 +104,7 @@ fn frequencies(hz: &[f64], model: &ModelResponse) -> Vec<Guide> {
 }
 
 /// The regions at some frequencies as one line with gaps.
-fn ellipses(pair: &Pair, band: &Band) -> Option<Curve> {
+fn ellipses(pair: &Pair, band: &DrawnBand) -> Option<Curve> {
     let model = pair.models.iter().find(|model| model.method == band.method)?;
     let mut curve = Curve { method: band.method.clone(), note: percent(band.level), ..Curve::default() };
     let every = (pair.hz.len() / ELLIPSES).max(1);

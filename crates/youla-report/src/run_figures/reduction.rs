@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::{RunFigure, axis, key, logarithmic};
-use crate::data::{Reduction, ReductionOrder};
+use crate::data::{DrawnReduction, ReductionOrder};
 use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 
 /// Relative errors below this are rounding, as of a model that is not reduced.
@@ -47,7 +47,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
     }]
 }
 
-fn curves(reduction: &Reduction, rows: &[&ReductionOrder]) -> Vec<Curve> {
+fn curves(reduction: &DrawnReduction, rows: &[&ReductionOrder]) -> Vec<Curve> {
     let bound = |row: &ReductionOrder| match (row.error_bound?, reduction.bound_is_gap, reduction.plant_norm) {
         (bound, true, _) => Some(bound),
         (bound, false, Some(norm)) if norm > 0.0 => Some(bound / norm),

@@ -3,8 +3,8 @@
 use super::choice::Chosen;
 use super::verification::channel;
 use super::{RunFigure, axis, choice, key};
-use crate::data::{Correlation, ResidualTest};
-use crate::figure::{Content, Curve, Figure, Layout, Panel, Region};
+use crate::data::{Correlation, DrawnResidualTest};
+use crate::figure::{Area, Content, Curve, Figure, Layout, Panel};
 
 /// One per record and output.
 pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
@@ -13,7 +13,7 @@ pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
     records.dedup();
     let mut figures = Vec::new();
     for (k, record) in records.iter().enumerate().filter(|(k, record)| !records[..*k].contains(record)) {
-        let tests: Vec<&ResidualTest> = residuals.tests.iter().filter(|test| test.record == *record).collect();
+        let tests: Vec<&DrawnResidualTest> = residuals.tests.iter().filter(|test| test.record == *record).collect();
         let outputs = tests.iter().map(|test| test.auto.len()).max().unwrap_or(0);
         let wanted = (0..outputs).filter(|output| chosen.output.is_none_or(|only| only == *output));
         let several = k > 0 || records.len() > 1 || chosen.several_verifications;
@@ -25,7 +25,7 @@ pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
 fn figure(
     chosen: &Chosen,
     record: &str,
-    tests: &[&ResidualTest],
+    tests: &[&DrawnResidualTest],
     output: usize,
     (several, external): (bool, bool),
 ) -> Figure {
@@ -59,8 +59,8 @@ fn has_curves(panel: &Panel) -> bool {
 
 fn panel<'a>(
     title: String,
-    tests: &[&'a ResidualTest],
-    of: impl Fn(&'a ResidualTest) -> Option<&'a Correlation>,
+    tests: &[&'a DrawnResidualTest],
+    of: impl Fn(&'a DrawnResidualTest) -> Option<&'a Correlation>,
     around_zero: bool,
 ) -> Panel {
     let all: Vec<(&str, &Correlation)> = tests
@@ -86,7 +86,7 @@ fn panel<'a>(
         x: axis("Lag", "samples"),
         y: axis("Correlation", ""),
         content: Content::Curves(all.iter().map(curve).collect()),
-        regions: vec![Region {
+        regions: vec![Area {
             method: "band of noise".into(),
             note: "99 %".into(),
             low: vec![-band; ends.len()],

@@ -37,7 +37,7 @@ fn report() -> ReportData {
             signal(SignalKind::Beta, "beta y", 0.9),
         ],
     };
-    let prediction = |method: &str, phase| Prediction {
+    let prediction = |method: &str, phase| DrawnPrediction {
         method: method.into(),
         predicted: trace(phase, &clock),
         residual: trace(3.0 * phase, &clock),
@@ -48,13 +48,13 @@ fn report() -> ReportData {
         predictions: vec![prediction("nominal", 0.4), prediction("hansen", 0.2)],
     };
     let correlation = |values: usize| Correlation::new(&wave(values, 1.0), 0.12);
-    let test = |method: &str| ResidualTest {
+    let test = |method: &str| DrawnResidualTest {
         record: "second".into(),
         method: method.into(),
         excitations: vec!["d".into()],
         auto: vec![correlation(26), correlation(26)],
         cross: vec![correlation(51), correlation(51)],
-        ..ResidualTest::default()
+        ..DrawnResidualTest::default()
     };
     let hz: Vec<f64> = (1..=60).map(|k| 0.8 * f64::from(k)).collect();
     let model = |method: &str, output| ModelResponse {
@@ -72,7 +72,7 @@ fn report() -> ReportData {
         phase_deg: hz.iter().map(|f| 1.0 - 3.0 * f).collect(),
         coherence: hz.iter().map(|f| if *f < 30.0 { 0.95 } else { 0.3 }).collect(),
     };
-    let band = |output| Band {
+    let band = |output| DrawnBand {
         method: "hansen".into(),
         output,
         input: 0,
@@ -93,7 +93,7 @@ fn report() -> ReportData {
         inputs: vec![Channel::new("u", "V")],
         outputs: vec![Channel::new("y 1", "um"), Channel::new("y/2", "um")],
         sample_time: Some(TS),
-        methods: vec![Method::nominal(), Method::hansen(), Method::hansen_reduced()],
+        methods: vec![DrawnMethod::nominal(), DrawnMethod::hansen(), DrawnMethod::hansen_reduced()],
         fits: vec![Fit { record: "second".into(), output: 0, method: "hansen".into(), fit: Some(91.25) }],
         experiments: vec![experiment],
         orders: vec![OrderChoice {
@@ -109,7 +109,7 @@ fn report() -> ReportData {
             outputs: vec![verified(0), verified(1)],
         }],
         residuals: Some(Residuals { tests: vec![test("nominal"), test("hansen")], ..Residuals::default() }),
-        frequency: Some(FrequencyResponse {
+        frequency: Some(DrawnResponses {
             hz: hz.clone(),
             models: vec![model("nominal", 0), model("hansen", 0), model("hansen", 1)],
             indirect: vec![indirect(0), indirect(1)],
@@ -120,13 +120,13 @@ fn report() -> ReportData {
                 noise_db: vec![-40.0, -41.0],
                 ..LineLevels::default()
             }],
-            deviations: vec![Deviation {
+            deviations: vec![DrawnDeviation {
                 hz: vec![hz[0] / 2.0, hz[1], hz[2], hz[3], hz[4], hz[5]],
                 total: vec![50.0, 20.0, 5.0, 4.0, 11.0, 3.0],
                 parts: vec![DeviationPart { cause: "noise".into(), percent: vec![50.0, 12.0, 4.0, 4.0, 9.0, 3.0] }],
                 limit: 10.0,
                 bands: vec![[hz[2], hz[3]], [hz[5], hz[5]]],
-                ..Deviation::default()
+                ..DrawnDeviation::default()
             }],
             singular: vec![SingularValue { method: "hansen".into(), place: 0, value_db: vec![3.0; hz.len()] }],
         }),
@@ -135,13 +135,13 @@ fn report() -> ReportData {
             poles: vec![[0.9, 0.3], [0.9, -0.3], [0.5, 0.0]],
             zeros: vec![[0.2, 0.0]],
         }],
-        reduction: Some(Reduction {
+        reduction: Some(DrawnReduction {
             label: "G(S) by balanced truncation".into(),
             hankel: vec![3.0, 1.0, 0.2],
             chosen: 2,
             plant_norm: Some(4.0),
             orders: vec![row(1), row(2), row(3)],
-            ..Reduction::default()
+            ..DrawnReduction::default()
         }),
         ..ReportData::default()
     }

@@ -3,7 +3,7 @@
 use super::choice::Chosen;
 use super::time::{detail, over_time, statement};
 use super::{RunFigure, axis, choice, key, span};
-use crate::data::{Prediction, Verification, VerifiedOutput};
+use crate::data::{DrawnPrediction, Verification, VerifiedOutput};
 use crate::figure::{Axis, Content, Curve, Figure, MEASURED, Panel};
 use crate::with_minus;
 use youla::signal::Channel;
@@ -40,7 +40,7 @@ fn measured(chosen: &Chosen, record: &Verification, output: &VerifiedOutput, cha
         let room = if high > low { high - low } else { 1.0 };
         [low - 0.3 * room, high + 0.3 * room]
     });
-    let predicted = |prediction: &Prediction| Curve {
+    let predicted = |prediction: &DrawnPrediction| Curve {
         note: fit(chosen, record, output.output, &prediction.method),
         ..over_time(&prediction.method, &prediction.predicted, &record.clock)
     };

@@ -6,7 +6,7 @@ use super::path::Path;
 use super::scale::{Place, Scale};
 use super::style::Styles;
 use super::text::{self, REMARK};
-use crate::figure::{Guide, GuideKind, Panel, Region};
+use crate::figure::{Area, Guide, GuideKind, Panel};
 
 /// Opacity of an area.
 pub(super) const REGION: f64 = 0.22;
@@ -88,7 +88,7 @@ pub(super) fn draw_labels(canvas: &mut Canvas, guides: &[Guide], (x, y): (&Scale
 }
 
 /// The area within the frame, one polygon per piece without gaps; down to the frame where it is open below.
-fn area(region: &Region, x: &Scale, y: &Scale, frame: Frame) -> Path {
+fn area(region: &Area, x: &Scale, y: &Scale, frame: Frame) -> Path {
     let inside = |across: f64, up: f64| {
         (x.at(across).clamp(frame.left, frame.right()), y.at(up).clamp(frame.top, frame.bottom()))
     };

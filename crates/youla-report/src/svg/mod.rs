@@ -35,7 +35,7 @@ mod ticks;
 pub(crate) use style::{Marker, Styles};
 pub use text::pretty_unit;
 
-use super::data::Method;
+use super::data::DrawnMethod;
 use super::figure::{Content, Figure, Panel};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,7 @@ impl Default for Print {
 /// say, [`youla::Error::OutOfRange`] where the range of an axis is not one.
 ///
 /// ```
-/// use youla_report::data::Method;
+/// use youla_report::data::DrawnMethod;
 /// use youla_report::figure::{Content, Curve, Drawn, Figure, Panel};
 /// let curve = Curve {
 ///     method: "hansen".into(),
@@ -90,11 +90,11 @@ impl Default for Print {
 /// };
 /// let panel = Panel { content: Content::Curves(vec![curve]), ..Panel::default() };
 /// let figure = Figure { panels: vec![panel], ..Figure::default() };
-/// let file = youla_report::svg(&figure, &[Method::hansen()])?;
+/// let file = youla_report::svg(&figure, &[DrawnMethod::hansen()])?;
 /// assert!(file.starts_with("<svg") && file.contains("Hansen G(S)"));
 /// # Ok::<(), youla_report::Error>(())
 /// ```
-pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
+pub fn svg(figure: &Figure, methods: &[DrawnMethod]) -> Result<String> {
     svg_for(figure, methods, &Print::default())
 }
 
@@ -110,7 +110,7 @@ pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
 /// assert!(svg_for(&figure, &[], &print)?.contains("height=\"60mm\""));
 /// # Ok::<(), youla_report::Error>(())
 /// ```
-pub fn svg_for(figure: &Figure, methods: &[Method], print: &Print) -> Result<String> {
+pub fn svg_for(figure: &Figure, methods: &[DrawnMethod], print: &Print) -> Result<String> {
     let size = |side: &str, value: f64, range: std::ops::RangeInclusive<f64>, must| match range.contains(&value) {
         true => Ok(()),
         false => Err(Error::Method(youla::Error::OutOfRange {

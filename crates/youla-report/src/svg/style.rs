@@ -2,7 +2,7 @@
 
 use super::canvas::Paint;
 use super::path::Path;
-use crate::data::{Method, Role};
+use crate::data::{DrawnMethod, MethodRole};
 use crate::figure::MEASURED;
 use serde::Serialize;
 
@@ -79,11 +79,11 @@ const fn style(
 
 /// The methods of a page and their styles.
 pub(crate) struct Styles<'a> {
-    methods: &'a [Method],
+    methods: &'a [DrawnMethod],
 }
 
 impl<'a> Styles<'a> {
-    pub(crate) fn new(methods: &'a [Method]) -> Self {
+    pub(crate) fn new(methods: &'a [DrawnMethod]) -> Self {
         Styles { methods }
     }
 
@@ -96,17 +96,17 @@ impl<'a> Styles<'a> {
             let known = BEFORE.iter().chain(&AFTER).find(|(name, _)| *name == key);
             return known.map_or(OTHER_STYLES[0], |(_, style)| *style);
         };
-        let others = self.methods[..place].iter().filter(|method| method.role == Role::Other).count();
+        let others = self.methods[..place].iter().filter(|method| method.role == MethodRole::Other).count();
         match self.methods[place].role {
-            Role::Recommended => style("--recommended", "#c2185b", 1.15, &[], Marker::Circle),
-            Role::Nominal => style("--nominal", "#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
-            Role::Pem => style("--pem", "#b0457b", 0.85, &[5.5, 1.5], Marker::Up),
-            Role::PemMultiStart => style("--pem-multi-start", "#8a7a00", 0.85, &[2.5, 1.2], Marker::Down),
-            Role::Direct => style("--direct", "#d55e00", 0.85, &[4.5, 1.5, 1.0, 1.5], Marker::Square),
-            Role::Hansen => style("--hansen", "#0072b2", 0.95, &[], Marker::Circle),
-            Role::HansenReduced => style("--hansen-reduced", "#009e73", 0.85, &[3.5, 2.0], Marker::Diamond),
-            Role::HansenPem => style("--hansen-pem", "#5b2ca0", 0.9, &[8.0, 1.2, 1.2, 1.2], Marker::Cross),
-            Role::Other => OTHER_STYLES[others % OTHER_STYLES.len()],
+            MethodRole::Recommended => style("--recommended", "#c2185b", 1.15, &[], Marker::Circle),
+            MethodRole::Nominal => style("--nominal", "#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
+            MethodRole::Pem => style("--pem", "#b0457b", 0.85, &[5.5, 1.5], Marker::Up),
+            MethodRole::PemMultiStart => style("--pem-multi-start", "#8a7a00", 0.85, &[2.5, 1.2], Marker::Down),
+            MethodRole::Direct => style("--direct", "#d55e00", 0.85, &[4.5, 1.5, 1.0, 1.5], Marker::Square),
+            MethodRole::Hansen => style("--hansen", "#0072b2", 0.95, &[], Marker::Circle),
+            MethodRole::HansenReduced => style("--hansen-reduced", "#009e73", 0.85, &[3.5, 2.0], Marker::Diamond),
+            MethodRole::HansenPem => style("--hansen-pem", "#5b2ca0", 0.9, &[8.0, 1.2, 1.2, 1.2], Marker::Cross),
+            MethodRole::Other => OTHER_STYLES[others % OTHER_STYLES.len()],
         }
     }
 
@@ -203,8 +203,8 @@ mod tests {
 
     #[test]
     fn a_style_depends_on_the_list_of_methods_and_not_on_the_figure() {
-        let other = |key: &str| Method::new(key, key, Role::Other);
-        let methods = [other("a"), Method::hansen(), other("b"), Method::pem()];
+        let other = |key: &str| DrawnMethod::new(key, key, MethodRole::Other);
+        let methods = [other("a"), DrawnMethod::hansen(), other("b"), DrawnMethod::pem()];
         let styles = Styles::new(&methods);
         assert_eq!(styles.of("hansen").colour, "#0072b2");
         assert_eq!(styles.of("pem").colour, "#b0457b");

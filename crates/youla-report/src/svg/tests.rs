@@ -3,10 +3,10 @@
 use roxmltree::{Document, Node};
 
 use super::*;
-use crate::figure::{Axis, Cell, Cells, Curve, Drawn, Guide, Layout, MEASURED, Region, Sample};
+use crate::figure::{Area, Axis, Cell, Cells, Curve, Drawn, Guide, Layout, MEASURED, Sample};
 
-fn methods() -> Vec<Method> {
-    vec![Method::nominal(), Method::pem(), Method::direct(), Method::hansen()]
+fn methods() -> Vec<DrawnMethod> {
+    vec![DrawnMethod::nominal(), DrawnMethod::pem(), DrawnMethod::direct(), DrawnMethod::hansen()]
 }
 
 fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
@@ -293,7 +293,7 @@ fn figures_have_the_size_that_is_asked_for_and_their_font() {
 
 #[test]
 fn areas_shades_and_lines_stand_behind_the_curves() {
-    let region = Region {
+    let region = Area {
         method: "hansen".into(),
         note: "95 %".into(),
         x: vec![0.0, 1.0, 2.0, 3.0, 4.0],

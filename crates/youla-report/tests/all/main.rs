@@ -7,7 +7,7 @@
 mod sample;
 mod story;
 
-use youla_report::data::{FrequencyResponse, Method, ReportData, SignalKind, UnlistedModes};
+use youla_report::data::{DrawnMethod, DrawnResponses, ReportData, SignalKind, UnlistedModes};
 use youla_report::figure::{Content, Curve, Drawn, Figure, MEASURED};
 use youla_report::html;
 
@@ -123,7 +123,7 @@ fn text_of_the_user_cannot_leave_its_place() {
     data.verdict.iter_mut().for_each(|line| line.text = evil.into());
     data.findings.iter_mut().for_each(|finding| finding.what = evil.into());
     data.outputs[0].name = evil.into();
-    data.methods.push(Method::new("other", evil, youla_report::data::Role::Other));
+    data.methods.push(DrawnMethod::new("other", evil, youla_report::data::MethodRole::Other));
     let page = written("report-hostile", &data);
     assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
     assert_eq!(page.matches("</script>").count(), 3);
@@ -156,7 +156,7 @@ fn missing_parts_are_left_out() {
     data.verification.clear();
     data.fits.clear();
     data.reduction = None;
-    data.frequency = data.frequency.map(|response| FrequencyResponse { indirect: Vec::new(), ..response });
+    data.frequency = data.frequency.map(|response| DrawnResponses { indirect: Vec::new(), ..response });
     data.certificates[0].worst_closed_loop_pole = None;
     let partial = written("report-partial", &data);
     for (part, in_partial) in [("verification", false), ("reduction", false), ("frequency", true), ("poles", true)] {

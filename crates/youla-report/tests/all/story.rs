@@ -1,7 +1,7 @@
 //! Stories as files: every section, table and figure is there, nothing else is fetched.
 
 use serde_json::Value;
-use youla_report::data::Method;
+use youla_report::data::DrawnMethod;
 use youla_report::figure::*;
 use youla_report::story::*;
 use youla_report::{Story, story_html};
@@ -80,7 +80,8 @@ fn cells() -> Block {
 }
 
 fn table() -> Table {
-    let row = |method: &str, cells: [&str; 3]| Row { method: method.into(), cells: cells.map(String::from).into() };
+    let row =
+        |method: &str, cells: [&str; 3]| TableRow { method: method.into(), cells: cells.map(String::from).into() };
     Table {
         key: "fits".into(),
         title: "Table 1".into(),
@@ -103,12 +104,12 @@ fn story() -> Story {
         summary: "What came out.".into(),
         program: "youla 0.2.0".into(),
         methods: vec![
-            Method::nominal(),
-            Method::pem(),
-            Method::pem_multi_start(),
-            Method::direct(),
-            Method::hansen(),
-            Method::hansen_reduced(),
+            DrawnMethod::nominal(),
+            DrawnMethod::pem(),
+            DrawnMethod::pem_multi_start(),
+            DrawnMethod::direct(),
+            DrawnMethod::hansen(),
+            DrawnMethod::hansen_reduced(),
         ],
         sections: vec![
             section(

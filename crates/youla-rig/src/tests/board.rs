@@ -67,7 +67,7 @@ fn loop_of_the_low_pass_runs_excited() {
         }
         let request = match sample {
             10 => Request::Arm,
-            11 => Request::Start { source: crate::Source::Own, amplitude: 0.5 },
+            11 => Request::Start { source: crate::SequenceOrigin::Own, amplitude: 0.5 },
             // A sign of life each 0.1 s.
             _ if sample % 500 == 0 => Request::Alive,
             _ => continue,

@@ -169,7 +169,7 @@ fn a_stop_succeeds_beside_a_host_that_asks_fast() {
     for _ in 0..3 {
         // Until the ramp of the stop before is out.
         while matches!(first.ask(&Request::Arm), Err(Error::Refused { outcome: Outcome::Exciting, .. })) {}
-        let start = Request::Start { source: Source::Prbs { order: 15, hold: 4 }, amplitude: 0.1 };
+        let start = Request::Start { source: SequenceOrigin::Prbs { order: 15, hold: 4 }, amplitude: 0.1 };
         first.ask(&start).unwrap();
         let (_, stopped) = Rig::stop(&served.address).unwrap();
         assert_eq!(stopped.status.phase(), Phase::Idle);

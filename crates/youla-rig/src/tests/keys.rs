@@ -56,7 +56,7 @@ fn an_excitation_is_stopped_by_anybody_and_recorded_by_who_has_the_key() {
     let served = Served::of(|| rotor(1).unwrap(), Pace::RealTime(Duration::from_micros(50)), Some(own.key()));
     let mut rig = Rig::connect(&own.of(&served)).unwrap();
     rig.ask(&Request::Arm).unwrap();
-    rig.ask(&Request::Start { source: Source::Prbs { order: 15, hold: 4 }, amplitude: 0.1 }).unwrap();
+    rig.ask(&Request::Start { source: SequenceOrigin::Prbs { order: 15, hold: 4 }, amplitude: 0.1 }).unwrap();
     let path = file("keys");
     let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();
     for _ in 0..10 {

@@ -4,7 +4,7 @@ use super::*;
 use crate::{Recorder, Request, Rig, rotor};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use youla_link::{LARGEST_FRAME, Source};
+use youla_link::{LARGEST_FRAME, SequenceOrigin};
 use youla_rt::Phase;
 
 /// Serves a rotor in lock-step on a serial line: 20 rows for each request. Noise between the packets, as a plug makes it.
@@ -43,7 +43,7 @@ fn rows_come_over_a_serial_line() {
     let path = std::env::temp_dir().join(format!("youla-rig-serial-{}.csv", std::process::id()));
     let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();
     rig.ask(&Request::Arm).unwrap();
-    rig.ask(&Request::Start { source: Source::Prbs { order: 10, hold: 2 }, amplitude: 0.2 }).unwrap();
+    rig.ask(&Request::Start { source: SequenceOrigin::Prbs { order: 10, hold: 2 }, amplitude: 0.2 }).unwrap();
     for _ in 0..100 {
         rig.ask(&Request::Alive).unwrap();
     }

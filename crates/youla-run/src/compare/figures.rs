@@ -5,13 +5,13 @@ use crate::Result;
 use crate::page::decibels::{decibel, drawn};
 use std::f64::consts::{PI, TAU};
 use youla::lti::{FrequencyResponse, TimeDomain, frequency_response};
-use youla_report::data as draw;
+use youla_report::data;
 
 /// Responses of all models on the frequencies of all runs, with the bounds that each run found. Beyond the Nyquist frequency of a
 /// run there is nothing.
-pub(super) fn frequency(runs: &[FinishedRun], model: &str) -> Result<draw::FrequencyResponse> {
+pub(super) fn frequency(runs: &[FinishedRun], model: &str) -> Result<data::DrawnResponses> {
     let hz = grid(runs);
-    let mut all = draw::FrequencyResponse { hz: hz.clone(), ..draw::FrequencyResponse::default() };
+    let mut all = data::DrawnResponses { hz: hz.clone(), ..data::DrawnResponses::default() };
     for run in runs {
         let nyquist = PI / run.model.system.time().ts();
         let omega: Vec<f64> = hz.iter().map(|f| TAU * f).filter(|w| *w < nyquist).collect();
@@ -34,7 +34,7 @@ fn grid(runs: &[FinishedRun]) -> Vec<f64> {
     hz
 }
 
-fn entries(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Vec<draw::ModelResponse> {
+fn entries(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Vec<data::ModelResponse> {
     let mut all = drawn(&run.key, response);
     for entry in &mut all {
         entry.magnitude_db.resize(length, f64::NAN);
@@ -43,11 +43,11 @@ fn entries(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Ve
     all
 }
 
-fn singular(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Result<Vec<draw::SingularValue>> {
+fn singular(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Result<Vec<data::SingularValue>> {
     let gains = response.gains()?;
     let count = gains.first().map_or(0, Vec::len);
     let beyond = std::iter::repeat_n(f64::NAN, length - gains.len());
-    let one = |place: usize| draw::SingularValue {
+    let one = |place: usize| data::SingularValue {
         method: run.key.clone(),
         place,
         value_db: gains.iter().map(|at| decibel(at[place])).chain(beyond.clone()).collect(),
@@ -56,9 +56,9 @@ fn singular(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> R
 }
 
 /// The bounds of a run on the common frequencies, in between by lines in dB over the logarithm of frequency.
-fn bands(run: &FinishedRun, model: &str, hz: &[f64]) -> Vec<draw::Band> {
+fn bands(run: &FinishedRun, model: &str, hz: &[f64]) -> Vec<data::DrawnBand> {
     let Some(own) = &run.report.frequency else { return Vec::new() };
-    let of = |band: &draw::Band| draw::Band {
+    let of = |band: &data::DrawnBand| data::DrawnBand {
         method: run.key.clone(),
         low_db: hz.iter().map(|f| between(&own.hz, &band.low_db, *f)).collect(),
         high_db: hz.iter().map(|f| between(&own.hz, &band.high_db, *f)).collect(),
@@ -80,7 +80,7 @@ fn between(hz: &[f64], values: &[f64], at: f64) -> f64 {
 }
 
 /// Poles and zeros in z, or, where sample times differ, in s.
-pub(super) fn poles(run: &FinishedRun, in_z: bool) -> Result<draw::Poles> {
+pub(super) fn poles(run: &FinishedRun, in_z: bool) -> Result<data::Poles> {
     let g = &run.model.system;
     let place = |z: &youla::c64| {
         let at = if in_z { *z } else { g.time().continuous_pole(*z) };
@@ -88,12 +88,12 @@ pub(super) fn poles(run: &FinishedRun, in_z: bool) -> Result<draw::Poles> {
     };
     let zeros = if in_z && g.inputs() == g.outputs() { g.zeros()? } else { Vec::new() };
     let poles = g.poles()?.iter().map(place).filter(|p| p[0].is_finite()).collect();
-    Ok(draw::Poles { method: run.key.clone(), poles, zeros: zeros.iter().map(place).collect() })
+    Ok(data::Poles { method: run.key.clone(), poles, zeros: zeros.iter().map(place).collect() })
 }
 
 /// The verification records of the first run, with the predictions of every run that was verified on the same samples.
-pub(super) fn verification(runs: &[FinishedRun], model: &str) -> Vec<draw::Verification> {
-    let of_record = |record: &draw::Verification| {
+pub(super) fn verification(runs: &[FinishedRun], model: &str) -> Vec<data::Verification> {
+    let of_record = |record: &data::Verification| {
         let mut drawn = record.clone();
         for output in &mut drawn.outputs {
             output.predictions = runs.iter().filter_map(|r| prediction(r, model, record, output)).collect();
@@ -106,12 +106,12 @@ pub(super) fn verification(runs: &[FinishedRun], model: &str) -> Vec<draw::Verif
 fn prediction(
     run: &FinishedRun,
     model: &str,
-    record: &draw::Verification,
-    output: &draw::VerifiedOutput,
-) -> Option<draw::Prediction> {
-    let same = |v: &&draw::Verification| v.record == record.record && v.clock == record.clock;
+    record: &data::Verification,
+    output: &data::VerifiedOutput,
+) -> Option<data::DrawnPrediction> {
+    let same = |v: &&data::Verification| v.record == record.record && v.clock == record.clock;
     let found = run.report.verification.iter().find(same)?;
     let of_output = found.outputs.iter().find(|o| o.output == output.output && o.measured == output.measured)?;
     let own = of_output.predictions.iter().find(|p| p.method == model)?;
-    Some(draw::Prediction { method: run.key.clone(), ..own.clone() })
+    Some(data::DrawnPrediction { method: run.key.clone(), ..own.clone() })
 }

@@ -19,12 +19,18 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use youla_io::folder::replace_files;
 use youla_io::require_free;
-use youla_report::data::{Method, ReportData, Role, Source};
+use youla_report::data::{DrawnMethod, MethodRole, ReportData, SourceFile};
 use youla_report::html;
 
 /// Roles give each run a colour, dash and marker of its own.
-const ROLES: [Role; 6] =
-    [Role::Hansen, Role::Direct, Role::HansenReduced, Role::Pem, Role::HansenPem, Role::PemMultiStart];
+const ROLES: [MethodRole; 6] = [
+    MethodRole::Hansen,
+    MethodRole::Direct,
+    MethodRole::HansenReduced,
+    MethodRole::Pem,
+    MethodRole::HansenPem,
+    MethodRole::PemMultiStart,
+];
 
 /// What a comparison found.
 #[derive(Debug, Clone, Serialize)]
@@ -121,11 +127,11 @@ fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<Rep
     })
 }
 
-fn method(place: usize, run: &FinishedRun) -> Method {
-    Method::new(&run.key, &run.name, ROLES.get(place).copied().unwrap_or(Role::Other))
+fn method(place: usize, run: &FinishedRun) -> DrawnMethod {
+    DrawnMethod::new(&run.key, &run.name, ROLES.get(place).copied().unwrap_or(MethodRole::Other))
 }
 
-fn sources(run: &FinishedRun) -> Vec<Source> {
-    let of = |s: &Source| Source { purpose: format!("{}: {}", run.name, s.purpose), ..s.clone() };
+fn sources(run: &FinishedRun) -> Vec<SourceFile> {
+    let of = |s: &SourceFile| SourceFile { purpose: format!("{}: {}", run.name, s.purpose), ..s.clone() };
     run.report.sources.iter().map(of).collect()
 }

@@ -4,7 +4,7 @@ use super::run::FinishedRun;
 use crate::page::models;
 use youla::error::Seconds;
 use youla::signal::Channel;
-use youla_report::data::{EvidenceTable, Mode, Note, ReportData, Status, Verdict};
+use youla_report::data::{DrawnMode, EvidenceTable, LineStatus, Note, ReportData, Verdict};
 use youla_report::match_modes;
 use youla_report::numbers::fit;
 
@@ -26,8 +26,8 @@ pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
 }
 
 fn verdict(report: &ReportData) -> String {
-    let of = |status: Status| report.verdict.iter().filter(|v| v.status == status).collect::<Vec<&Verdict>>();
-    let (bad, caution) = (of(Status::Bad), of(Status::Caution));
+    let of = |status: LineStatus| report.verdict.iter().filter(|v| v.status == status).collect::<Vec<&Verdict>>();
+    let (bad, caution) = (of(LineStatus::Bad), of(LineStatus::Caution));
     match (bad.first(), caution.len()) {
         (Some(line), _) => line.text.clone(),
         (None, 0) if report.verdict.is_empty() => "no verdict".into(),
@@ -42,16 +42,16 @@ fn mean_fit(run: &FinishedRun) -> Option<f64> {
 
 /// The oscillating modes of the first run, and how far those of the others are from them.
 pub(super) fn modes(runs: &[FinishedRun]) -> EvidenceTable {
-    let all: Vec<Vec<Mode>> = runs.iter().map(oscillating).collect();
-    let first: Vec<&Mode> = all[0].iter().collect();
-    let partners: Vec<Vec<Option<&Mode>>> = all[1..]
+    let all: Vec<Vec<DrawnMode>> = runs.iter().map(oscillating).collect();
+    let first: Vec<&DrawnMode> = all[0].iter().collect();
+    let partners: Vec<Vec<Option<&DrawnMode>>> = all[1..]
         .iter()
         .map(|modes| {
             let places = match_modes(&first, &modes.iter().collect::<Vec<_>>());
             places.into_iter().map(|place| place.and_then(|k| modes.get(k))).collect()
         })
         .collect();
-    let row = |(k, mode): (usize, &Mode)| -> Vec<String> {
+    let row = |(k, mode): (usize, &DrawnMode)| -> Vec<String> {
         let others = partners.iter().map(|of| of[k].map_or("\u{2013}".into(), |other| difference(mode, other)));
         [format!("{:.2} Hz, \u{3b6} {:.4}", mode.hz, mode.zeta)].into_iter().chain(others).collect()
     };
@@ -64,14 +64,14 @@ pub(super) fn modes(runs: &[FinishedRun]) -> EvidenceTable {
     }
 }
 
-fn oscillating(run: &FinishedRun) -> Vec<Mode> {
+fn oscillating(run: &FinishedRun) -> Vec<DrawnMode> {
     let all = run.entry().map_or_else(Vec::new, |model| models::modes(&run.key, model));
-    let mut modes: Vec<Mode> = all.into_iter().filter(|m| m.hz > 0.0 && m.zeta.abs() < 1.0).collect();
+    let mut modes: Vec<DrawnMode> = all.into_iter().filter(|m| m.hz > 0.0 && m.zeta.abs() < 1.0).collect();
     modes.sort_by(|a, b| a.hz.total_cmp(&b.hz));
     modes
 }
 
-fn difference(from: &Mode, to: &Mode) -> String {
+fn difference(from: &DrawnMode, to: &DrawnMode) -> String {
     let text = format!(
         "{:+.2} Hz ({:+.2} %), \u{3b6} {:+.4}",
         to.hz - from.hz,
@@ -94,7 +94,7 @@ pub(super) fn notes(runs: &[FinishedRun]) -> Vec<Note> {
     let channels =
         |r: &ReportData| r.inputs.iter().chain(&r.outputs).map(Channel::label).collect::<Vec<_>>().join(", ");
     let time = |r: &ReportData| r.sample_time.map_or("no".into(), |ts| Seconds(ts).to_string());
-    let mut add = |text: String| all.push(Note { status: Status::Caution, text });
+    let mut add = |text: String| all.push(Note { status: LineStatus::Caution, text });
     for run in &runs[1..] {
         let (a, b) = (&first.report, &run.report);
         if (&a.inputs, &a.outputs) != (&b.inputs, &b.outputs) {

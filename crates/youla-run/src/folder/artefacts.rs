@@ -23,4 +23,4 @@ pub struct Provenance<O = RunSettings> {
 }
 
 /// A discrete-time model as an artefact.
-pub type ModelFile<O = RunSettings> = youla_io::ModelFile<Provenance<O>>;
+pub type RunModelFile<O = RunSettings> = youla_io::ModelFile<Provenance<O>>;

@@ -7,7 +7,7 @@ pub(crate) mod write;
 mod files;
 mod uncertainty;
 
-use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
+use crate::folder::artefacts::{Provenance, RunModelFile, SCHEMA};
 use crate::folder::subspace_details::SubspaceDetails;
 use crate::folder::uncertainty::UncertaintyFile;
 use crate::page::pid;
@@ -278,7 +278,7 @@ impl Writer<'_> {
     ) -> Result<()> {
         let title = name.rsplit('/').next().unwrap_or(name);
         let details = to_value(details)?;
-        let file = ModelFile::new(title, model, ports, details, self.provenance.clone())?;
+        let file = RunModelFile::new(title, model, ports, details, self.provenance.clone())?;
         self.folder.json(&format!("{name}.json"), &file)?;
         let variables = [
             array("a", model.a()),

@@ -2,12 +2,12 @@
 
 use crate::stages::certificate::RunCertificate;
 use youla::validate::MarginInterval;
-use youla_report::data::{EvidenceTable, ReportPart, Status, Verdict};
+use youla_report::data::{EvidenceTable, LineStatus, ReportPart, Verdict};
 use youla_report::{numbers, with_minus};
 
 /// The controller on the region of the plant.
 pub(super) fn line(certificate: &RunCertificate) -> Verdict {
-    let status = if certificate.band.holds() { Status::Good } else { Status::Caution };
+    let status = if certificate.band.holds() { LineStatus::Good } else { LineStatus::Caution };
     Verdict { status, text: sentence(certificate), evidence: ReportPart::Certificate }
 }
 

@@ -7,7 +7,7 @@ use crate::summary::Summary;
 use crate::summary::entries::RealPoleEntry;
 use crate::summary::model::ModelEntry;
 use youla::identify::likelihood::Evidence;
-use youla_report::data::{ReportPart, Status, Verdict};
+use youla_report::data::{LineStatus, ReportPart, Verdict};
 use youla_report::numbers;
 
 /// Residual of the model over that of the nominal model, from which the fit is called worse: two good models differ by chance.
@@ -21,7 +21,7 @@ const MOSTLY: f64 = 0.5;
 pub(super) fn line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     if found.records.verification.is_empty() {
         let text = "No verification record was given, so the fit on fresh data is unknown.".into();
-        return Some(Verdict { status: Status::Caution, text, evidence: ReportPart::Fits });
+        return Some(Verdict { status: LineStatus::Caution, text, evidence: ReportPart::Fits });
     }
     let of = |method: Method| summary.model(method)?.mean_fit();
     let (method, model) = subject(found, summary)?;
@@ -41,7 +41,7 @@ pub(super) fn line(found: &Identification, summary: &Summary) -> Option<Verdict>
     text += reason.as_ref().map_or("", |(_, words)| words);
     // A fit says how much of the output is not noise; a high one is no evidence of a right model.
     let worse = !fit.is_finite() || nominal.is_some_and(|nominal| 100.0 - fit > WORSE * (100.0 - nominal));
-    let status = if worse { Status::Bad } else { reason.map_or(Status::Info, |(status, _)| status) };
+    let status = if worse { LineStatus::Bad } else { reason.map_or(LineStatus::Info, |(status, _)| status) };
     Some(Verdict { status, text, evidence: ReportPart::Fits })
 }
 
@@ -105,19 +105,20 @@ impl Moments {
 }
 
 /// Why a fit is low, and whether that is a warning.
-fn reason(left: Option<Left>, model: &ModelEntry) -> (Status, String) {
+fn reason(left: Option<Left>, model: &ModelEntry) -> (LineStatus, String) {
     let slow = left.filter(|left| left.slow >= MOSTLY);
     let mut text = slow.map_or_else(String::new, |left| of_offset(left, model));
     if slow.is_some_and(|left| left.fit >= LOW) {
-        return (Status::Info, text);
+        return (LineStatus::Info, text);
     }
     let rest = if slow.is_some() { "The rest of it" } else { "What is left" };
     let (status, words) = match independent(model) {
-        Some(true) => (Status::Info, "does not depend on past excitation: it is noise and disturbance"),
-        Some(false) => (Status::Info, "depends on past excitation: see the line on the residual"),
-        None => {
-            (Status::Caution, "is not explained: no excitation is known that would tell noise from missing dynamics")
-        }
+        Some(true) => (LineStatus::Info, "does not depend on past excitation: it is noise and disturbance"),
+        Some(false) => (LineStatus::Info, "depends on past excitation: see the line on the residual"),
+        None => (
+            LineStatus::Caution,
+            "is not explained: no excitation is known that would tell noise from missing dynamics",
+        ),
     };
     text += &format!(" {rest} {words}.");
     (status, text)

@@ -12,7 +12,7 @@ use youla::Mat;
 use youla::c64;
 use youla::identify::likelihood::{EntryErrors, LARGEST_IN_BAND};
 use youla::lti::FrequencyResponse;
-use youla_report::data as draw;
+use youla_report::data;
 
 /// Level of the regions that are stated.
 const LEVEL: f64 = 0.95;
@@ -21,7 +21,7 @@ const NORMAL: f64 = 1.959_963_984_540_054;
 /// Its quantile of chi-square with two degrees of freedom, for the region of a complex number.
 const ELLIPSE: f64 = 5.991_464_547_107_979;
 
-pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
+pub(crate) fn drawn(found: &Identification) -> Result<data::DrawnResponses> {
     let responses = model_responses(&found.validation, &found.hz)?;
     let models = responses.iter().flat_map(|(method, r)| decibels::drawn(method.key(), r)).collect();
     let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty(*method)?)));
@@ -30,15 +30,15 @@ pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let singular = singular(found, &responses)?;
     let (indirect, lines) = (indirect(found), nonparametric::drawn(found));
     let deviations = deviations(found)?;
-    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect, lines, bands, deviations, singular })
+    Ok(data::DrawnResponses { hz: found.hz.clone(), models, indirect, lines, bands, deviations, singular })
 }
 
-fn indirect(found: &Identification) -> Vec<draw::Indirect> {
+fn indirect(found: &Identification) -> Vec<data::Indirect> {
     let Some(Ok(measured)) = &found.indirect else { return Vec::new() };
     let hz: Vec<f64> = measured.response.omega.iter().map(|w| w / TAU).collect();
     let entry = |(output, input): (usize, usize)| {
         let values = measured.response.entry(output, input);
-        draw::Indirect {
+        data::Indirect {
             output,
             input,
             hz: hz.clone(),
@@ -51,7 +51,7 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
 }
 
 /// The region of the recommended model.
-fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<draw::Band> {
+fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<data::DrawnBand> {
     let Ok(model) = &found.recommended else { return Vec::new() };
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
     let errors = model.region.entry_errors(&found.hz);
@@ -59,7 +59,7 @@ fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]
 }
 
 /// The deviations of the recommended model by their causes.
-fn deviations(found: &Identification) -> Result<Vec<draw::Deviation>> {
+fn deviations(found: &Identification) -> Result<Vec<data::DrawnDeviation>> {
     let Ok(model) = &found.recommended else { return Ok(Vec::new()) };
     let region = &model.region;
     let omega: Vec<f64> = region.hz.iter().map(|hz| TAU * hz).collect();
@@ -72,9 +72,9 @@ fn deviations(found: &Identification) -> Result<Vec<draw::Deviation>> {
         let part = |(cause, all): (&str, &[Mat<f64>])| {
             let percent = percent(all);
             let some = percent.iter().any(|value| *value > 0.0);
-            some.then(|| draw::DeviationPart { cause: cause.into(), percent })
+            some.then(|| data::DeviationPart { cause: cause.into(), percent })
         };
-        draw::Deviation {
+        data::DrawnDeviation {
             output,
             input,
             hz: region.hz.clone(),
@@ -92,7 +92,7 @@ fn recommended_band(
     errors: &[EntryErrors],
     response: &FrequencyResponse,
     (output, input): (usize, usize),
-) -> draw::Band {
+) -> data::DrawnBand {
     let half = |g: &c64, error: &EntryErrors| NORMAL * error.of_magnitude(*g, (output, input));
     let bounds = response
         .entry(output, input)
@@ -100,7 +100,7 @@ fn recommended_band(
         .zip(errors)
         .map(|(g, e)| [g.norm() - half(&g, e), g.norm() + half(&g, e)]);
     let (low_db, high_db) = bounds_db(bounds);
-    draw::Band {
+    data::DrawnBand {
         method: Method::Likelihood.key().into(),
         output,
         input,
@@ -111,16 +111,16 @@ fn recommended_band(
     }
 }
 
-fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> draw::Band {
+fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> data::DrawnBand {
     let band = &known.response;
     let places: Vec<usize> = (0..band.response.omega.len()).map(|k| band.place(k, output, input)).collect();
     let (low_db, high_db) = bounds_db(places.iter().map(|at| band.magnitude[*at]));
     let region = places.iter().flat_map(|at| band.covariance[*at].map(|v| v * band.ellipse)).collect();
-    draw::Band { method: method.key().into(), output, input, level: known.level, low_db, high_db, region }
+    data::DrawnBand { method: method.key().into(), output, input, level: known.level, low_db, high_db, region }
 }
 
 /// Nothing for a single input or output: the one singular value is the length of the row or column.
-fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Result<Vec<draw::SingularValue>> {
+fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Result<Vec<data::SingularValue>> {
     let places = found.records.inputs.len().min(found.records.outputs.len());
     if places < 2 {
         return Ok(Vec::new());
@@ -129,7 +129,7 @@ fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -
     for (method, response) in responses {
         let gains = response.gains()?;
         for place in 0..places {
-            all.push(draw::SingularValue {
+            all.push(data::SingularValue {
                 method: method.key().into(),
                 place,
                 value_db: gains.iter().map(|at| decibel(at[place])).collect(),

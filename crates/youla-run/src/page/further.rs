@@ -4,7 +4,7 @@ use super::{loops, pid, redesign, reduction};
 use crate::result::Identification;
 use crate::summary::Summary;
 use youla_greybox::hansen_pem::PemStart;
-use youla_report::data::{ReportPart, Status, Verdict};
+use youla_report::data::{LineStatus, ReportPart, Verdict};
 
 /// Lines below the answer, each with its evidence.
 pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
@@ -35,26 +35,27 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
     );
     let (status, text) = match run.found.local_minimum_suspected {
         true => (
-            Status::Caution,
+            LineStatus::Caution,
             text + " The fit is more than 1 percentage point below that of G(S): the search ended in a local minimum, or the structure does not describe the plant.",
         ),
-        false if run.found.fit_of_plant.is_none() => {
-            (Status::Caution, text + " There is no G(S) to compare it with, so a local minimum could not be noticed.")
-        }
-        false => (Status::Good, text),
+        false if run.found.fit_of_plant.is_none() => (
+            LineStatus::Caution,
+            text + " There is no G(S) to compare it with, so a local minimum could not be noticed.",
+        ),
+        false => (LineStatus::Good, text),
     };
     let (doubt, residuals) = match &run.intervals {
         Ok(known) => (!known.residuals.independent() || known.coloured == known.residuals.white(), known.verdict()),
         Err(reason) => (true, format!("There are no intervals: {reason}.")),
     };
-    let status = if doubt { Status::Caution } else { status };
+    let status = if doubt { LineStatus::Caution } else { status };
     Some(Verdict { status, text: format!("{text} {residuals}"), evidence: ReportPart::Fits })
 }
 
 fn factor_line(summary: &Summary) -> Option<Verdict> {
     let residual = summary.bezout_residual?;
     // Half of the digits of double precision; scaled factors have 1e-13 (test `states_are_scaled_before_factorising`).
-    let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
+    let status = if residual < 1e-8 { LineStatus::Good } else { LineStatus::Bad };
     let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }
@@ -65,6 +66,6 @@ fn deviation_line(found: &Identification) -> Option<Verdict> {
     let stable = if s.stability.stable { "stable" } else { "unstable" };
     let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
     let text = format!("S has order {}, is {stable} and fits beta to {}.", s.model.order(), fit.join(", "));
-    let status = if s.stability.stable { Status::Info } else { Status::Bad };
+    let status = if s.stability.stable { LineStatus::Info } else { LineStatus::Bad };
     Some(Verdict { status, text, evidence: ReportPart::Order })
 }

@@ -5,7 +5,7 @@ use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
 use youla::control::IsoZone;
-use youla_report::data::{ReportPart, Status, Verdict};
+use youla_report::data::{LineStatus, ReportPart, Verdict};
 use youla_report::numbers;
 
 /// Both lines, as far as the run has them. Those that warn are part of the answer, the others stand below it.
@@ -15,7 +15,7 @@ pub(super) fn lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
 
 /// Whether a line belongs to the answer.
 pub(super) fn warns(line: &Verdict) -> bool {
-    matches!(line.status, Status::Caution | Status::Bad)
+    matches!(line.status, LineStatus::Caution | LineStatus::Bad)
 }
 
 /// Margins of the loop of the recommended model, of G(S) where there is none; nothing where the loop is unstable, which the answer
@@ -33,7 +33,7 @@ fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     let [lowest, highest] = numbers::factors(disk.lowest_gain?, disk.highest_gain);
     let status = status(zone, IsoZone::of(together));
     let all = match status {
-        Status::Caution if zone <= IsoZone::B => {
+        LineStatus::Caution if zone <= IsoZone::B => {
             ", where the same limits give a warning: changes of several outputs at once act more than those of one"
         }
         _ => "",
@@ -51,11 +51,11 @@ fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
 }
 
 /// By the zone of the worst output; a peak of all outputs together beyond zone B is a warning too.
-fn status(worst: IsoZone, together: IsoZone) -> Status {
+fn status(worst: IsoZone, together: IsoZone) -> LineStatus {
     match (worst, together) {
-        (IsoZone::D, _) => Status::Bad,
-        (IsoZone::C, _) | (_, IsoZone::C | IsoZone::D) => Status::Caution,
-        _ => Status::Good,
+        (IsoZone::D, _) => LineStatus::Bad,
+        (IsoZone::C, _) | (_, IsoZone::C | IsoZone::D) => LineStatus::Caution,
+        _ => LineStatus::Good,
     }
 }
 
@@ -71,10 +71,10 @@ mod tests {
 
     #[test]
     fn a_peak_of_all_outputs_together_is_a_warning_where_each_by_itself_is_harmless() {
-        assert_eq!(status(IsoZone::A, IsoZone::B), Status::Good);
-        assert_eq!(status(IsoZone::A, IsoZone::D), Status::Caution);
-        assert_eq!(status(IsoZone::C, IsoZone::C), Status::Caution);
-        assert_eq!(status(IsoZone::D, IsoZone::D), Status::Bad);
+        assert_eq!(status(IsoZone::A, IsoZone::B), LineStatus::Good);
+        assert_eq!(status(IsoZone::A, IsoZone::D), LineStatus::Caution);
+        assert_eq!(status(IsoZone::C, IsoZone::C), LineStatus::Caution);
+        assert_eq!(status(IsoZone::D, IsoZone::D), LineStatus::Bad);
         assert_eq!([degrees(0.18587), degrees(37.88), degrees(140.2)], ["0.19", "38", "140"]);
     }
 }

@@ -29,7 +29,7 @@ use notes::notes;
 use verdict::verdict_lines;
 use youla::identify::subspace::SubspaceModel;
 use youla::signal::Channel;
-use youla_report::data::{self as draw, ReportData, Role};
+use youla_report::data::{self, MethodRole, ReportData};
 use youla_report::pretty_unit;
 
 /// Collects what the report of a run shows; `run` names the run folder.
@@ -79,25 +79,25 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         margins: all().map(|(key, model)| models::margins(key, model)).collect(),
         margins_caption: margins_caption(found, summary),
         bezout_residual: summary.bezout_residual,
-        stages: summary.seconds.iter().map(|(name, t)| draw::Stage { name: name.clone(), seconds: *t }).collect(),
+        stages: summary.seconds.iter().map(|(name, t)| data::StageTime { name: name.clone(), seconds: *t }).collect(),
     })
 }
 
-fn method(method: Method) -> draw::Method {
+fn method(method: Method) -> data::DrawnMethod {
     let role = match method {
-        Method::Likelihood => Role::Recommended,
-        Method::Nominal => Role::Nominal,
-        Method::Direct => Role::Direct,
-        Method::Hansen => Role::Hansen,
-        Method::HansenReduced => Role::HansenReduced,
-        Method::GreyBox => Role::HansenPem,
-        Method::TruePlant => Role::Other,
+        Method::Likelihood => MethodRole::Recommended,
+        Method::Nominal => MethodRole::Nominal,
+        Method::Direct => MethodRole::Direct,
+        Method::Hansen => MethodRole::Hansen,
+        Method::HansenReduced => MethodRole::HansenReduced,
+        Method::GreyBox => MethodRole::HansenPem,
+        Method::TruePlant => MethodRole::Other,
     };
-    draw::Method::new(method.key(), method.label(), role)
+    data::DrawnMethod::new(method.key(), method.label(), role)
 }
 
-fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
-    let choice = |method: Method, label: &str, s: &SubspaceModel| draw::OrderChoice {
+fn orders(found: &Identification) -> Vec<data::OrderChoice> {
+    let choice = |method: Method, label: &str, s: &SubspaceModel| data::OrderChoice {
         method: method.key().into(),
         label: label.into(),
         values: s.singular_values.clone(),

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use youla::identify::likelihood::ResponseVariance;
 use youla::lti::frequency_response;
 use youla::signal::{LineGroup, LineResponse};
-use youla_report::data::{LevelBasis, LineLevels, ReportPart, Status, Verdict};
+use youla_report::data::{LevelBasis, LineLevels, LineStatus, ReportPart, Verdict};
 
 /// Standard normal number beyond which a group of lines differs: 3e-7 for one group, below 1e-4 for 300 of them.
 const LIMIT: f64 = 5.0;
@@ -85,7 +85,7 @@ pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
                 lines.lines.len(),
                 g.deviations.max(0.0)
             );
-            (Status::Good, text)
+            (LineStatus::Good, text)
         }
         g => {
             let text = format!(
@@ -95,7 +95,7 @@ pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
                 named(&g),
                 g.deviations
             );
-            (if g.relative > SLIGHT { Status::Caution } else { Status::Info }, text)
+            (if g.relative > SLIGHT { LineStatus::Caution } else { LineStatus::Info }, text)
         }
     });
     let distortion = largest(lines.distortion()).filter(|g| g.deviations > LIMIT).map(|g| {
@@ -106,7 +106,7 @@ pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
             named(&g),
             g.deviations
         );
-        (if g.relative > SLIGHT { Status::Caution } else { Status::Info }, text)
+        (if g.relative > SLIGHT { LineStatus::Caution } else { LineStatus::Info }, text)
     });
     agreement.into_iter().chain(distortion).map(line).collect()
 }

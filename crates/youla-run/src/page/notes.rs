@@ -10,14 +10,15 @@ use crate::summary::Summary;
 use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{SubspaceModel, amplitudes};
 use youla::signal::LoopRecord;
-use youla_report::data::{Note, ReportPart, Status, Verdict};
+use youla_report::data::{LineStatus, Note, ReportPart, Verdict};
 
 /// All warnings of a run as sentences, for the terminal, beside the verdict of the recommended model and its reasons. Those of the check of the
 /// data come first.
 pub fn cautions(found: &Identification, summary: &Summary) -> Vec<String> {
-    let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
+    let weigh =
+        |status: LineStatus, text: String| matches!(status, LineStatus::Caution | LineStatus::Bad).then_some(text);
     // The line on the data counts its findings; here each has its own sentence.
-    let said = |line: &Verdict| line.evidence == ReportPart::Recommended && line.status == Status::Bad;
+    let said = |line: &Verdict| line.evidence == ReportPart::Recommended && line.status == LineStatus::Bad;
     let trust =
         verdict_lines(found, summary).into_iter().filter(|line| line.evidence != ReportPart::Data && !said(line));
     let lines = trust.chain(further_lines(found, summary)).map(|v| weigh(v.status, v.text));
@@ -42,11 +43,11 @@ pub(crate) fn notes(found: &Identification, summary: &Summary) -> Vec<Note> {
 }
 
 fn info(text: String) -> Note {
-    Note { status: Status::Info, text }
+    Note { status: LineStatus::Info, text }
 }
 
 fn caution(text: String) -> Note {
-    Note { status: Status::Caution, text }
+    Note { status: LineStatus::Caution, text }
 }
 
 fn refusals(found: &Identification) -> Vec<Note> {

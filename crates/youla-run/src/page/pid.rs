@@ -4,18 +4,18 @@ use super::decibels::decibel;
 use super::redesign::loops;
 use youla::identify::likelihood::figure as digits;
 use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep};
-use youla_report::data::{self as draw, EvidenceTable, Method, ReportPart, Role, Status, Verdict};
-use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel, Region};
+use youla_report::data::{self, DrawnMethod, EvidenceTable, LineStatus, MethodRole, ReportPart, Verdict};
+use youla_report::figure::{Area, Axis, Content, Curve, Figure, Layout, Panel};
 
 /// The section of the page.
-pub(super) fn drawn(new: &PidRedesign) -> draw::Redesign {
-    draw::Redesign { loops: steps(), figure: figure(new), tables: tables(new) }
+pub(super) fn drawn(new: &PidRedesign) -> data::DrawnRedesign {
+    data::DrawnRedesign { loops: steps(), figure: figure(new), tables: tables(new) }
 }
 
 /// What the new controller promises.
 pub(super) fn line(new: &PidRedesign) -> Verdict {
     let good = new.reservations().is_empty() && new.rejection() >= 1.0;
-    let status = if good { Status::Good } else { Status::Caution };
+    let status = if good { LineStatus::Good } else { LineStatus::Caution };
     Verdict { status, text: sentence(new), evidence: ReportPart::Redesign }
 }
 
@@ -54,9 +54,9 @@ fn times(new: &PidRedesign) -> String {
 }
 
 /// The three steps as the figure names them.
-pub(crate) fn steps() -> Vec<Method> {
+pub(crate) fn steps() -> Vec<DrawnMethod> {
     let [running, new] = loops();
-    vec![running, Method::new("half", "half way", Role::Direct), new]
+    vec![running, DrawnMethod::new("half", "half way", MethodRole::Direct), new]
 }
 
 fn key(step: &PlannedStep) -> &'static str {
@@ -188,7 +188,7 @@ pub(crate) fn figure(new: &PidRedesign) -> Figure {
 
 fn panel(title: &str, (x, y): (Axis, Axis), of: Vec<(String, Vec<f64>, Vec<Band>)>) -> Panel {
     let at = |bands: &[Band], k: usize| bands.iter().map(|b| b[k]).collect::<Vec<f64>>();
-    let regions = of.iter().map(|(method, x, bands)| Region {
+    let regions = of.iter().map(|(method, x, bands)| Area {
         method: method.clone(),
         note: "95 %".into(),
         x: x.clone(),

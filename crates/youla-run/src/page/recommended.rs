@@ -2,7 +2,7 @@
 
 use crate::result::Identification;
 use youla::identify::likelihood::{
-    Candidate, Evidence, INDISTINCT, LikelihoodOptions, Outcome, Recommendation, figure,
+    Candidate, Evidence, INDISTINCT, LikelihoodOptions, Recommendation, TestOutcome, figure,
 };
 use youla::signal::Detrend;
 use youla_report::data::EvidenceTable;
@@ -20,16 +20,16 @@ pub(crate) fn tables(found: &Identification) -> Vec<EvidenceTable> {
 fn evidence(model: &Recommendation) -> EvidenceTable {
     let row = |e: &Evidence| {
         let outcome = match e.outcome {
-            Outcome::Passed => "passed",
-            Outcome::Failed => "failed",
-            Outcome::NotTested => "not tested",
+            TestOutcome::Passed => "passed",
+            TestOutcome::Failed => "failed",
+            TestOutcome::NotTested => "not tested",
         };
         let required = if e.required { "yes" } else { "no" };
         let at = e.hz.map_or(String::new(), |[low, high]| match low == high {
             true => figure(low),
             false => format!("{} to {}", figure(low), figure(high)),
         });
-        let value = if e.outcome == Outcome::NotTested { String::new() } else { e.value() };
+        let value = if e.outcome == TestOutcome::NotTested { String::new() } else { e.value() };
         let cells = [value, e.limit.to_string(), at, required.into(), outcome.into(), e.note.clone()];
         std::iter::once(e.question.clone()).chain(cells).collect()
     };

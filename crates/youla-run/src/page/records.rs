@@ -3,12 +3,12 @@
 use crate::Result;
 use crate::records::channels_of;
 use crate::result::Identification;
-use crate::settings::Prediction;
+use crate::settings::PredictionKind;
 use youla::MatRef;
 use youla::signal::Channel;
 use youla::signal::LoopRecord;
 use youla_loop::check::{Finding, Severity};
-use youla_report::data::{self as draw, SignalKind};
+use youla_report::data::{self, SignalKind};
 use youla_report::{Timeline, Trace};
 
 /// From what, in one sentence.
@@ -39,13 +39,13 @@ fn counted(count: usize, what: &str) -> String {
 }
 
 /// What the check of the data found, the most serious first.
-pub(crate) fn findings(found: &Identification) -> Vec<draw::DataFinding> {
+pub(crate) fn findings(found: &Identification) -> Vec<data::DataFinding> {
     let status = |severity: Severity| match severity {
-        Severity::Note => draw::Status::Info,
-        Severity::Caution => draw::Status::Caution,
-        Severity::Defect => draw::Status::Bad,
+        Severity::Note => data::LineStatus::Info,
+        Severity::Caution => data::LineStatus::Caution,
+        Severity::Defect => data::LineStatus::Bad,
     };
-    let one = |(f, more): (&Finding, usize)| draw::DataFinding {
+    let one = |(f, more): (&Finding, usize)| data::DataFinding {
         status: status(f.severity),
         test: f.test.key().into(),
         record: f.record.clone(),
@@ -62,7 +62,7 @@ pub(crate) fn findings(found: &Identification) -> Vec<draw::DataFinding> {
 ///
 /// # Errors
 /// Those of [`Trace::new`].
-pub(crate) fn experiments(found: &Identification) -> Result<Vec<draw::DrawnExperiment>> {
+pub(crate) fn experiments(found: &Identification) -> Result<Vec<data::DrawnExperiment>> {
     found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
 }
 
@@ -72,7 +72,7 @@ fn clock(record: &LoopRecord) -> Timeline {
     Timeline::around_largest_swing(record.time().ts(), &first)
 }
 
-fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::DrawnExperiment> {
+fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<data::DrawnExperiment> {
     let clock = clock(record);
     let (u, y) = (&found.records.inputs, &found.records.outputs);
     let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
@@ -86,7 +86,7 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
             let mut values = vec![f64::NAN; dropped];
             values.extend(data.col(j).iter());
             let trace = Trace::new(&channel.name, &values, &clock)?;
-            drawn.push(draw::Signal { kind, channel: channel.clone(), trace });
+            drawn.push(data::Signal { kind, channel: channel.clone(), trace });
         }
         Ok(())
     };
@@ -107,22 +107,24 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
         add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
         add(SignalKind::Beta, &named("beta", y), signals.beta())?;
     }
-    Ok(draw::DrawnExperiment { name: record.name().to_owned(), clock, signals: drawn })
+    Ok(data::DrawnExperiment { name: record.name().to_owned(), clock, signals: drawn })
 }
 
 /// Measured outputs beside the predictions of all models.
 ///
 /// # Errors
 /// Those of [`Trace::new`].
-pub(crate) fn verification(found: &Identification) -> Result<Vec<draw::Verification>> {
+pub(crate) fn verification(found: &Identification) -> Result<Vec<data::Verification>> {
     found.records.verification.iter().enumerate().map(|(k, r)| verified(found, k, r)).collect()
 }
 
-fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
+fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<data::Verification> {
     let clock = clock(record);
     let prediction = match found.validation.prediction {
-        Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
-        Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
+        PredictionKind::OpenLoop => "simulated from the measured input, initial state estimated",
+        PredictionKind::ClosedLoop => {
+            "simulated under the controller from the known excitations, initial state estimated"
+        }
     };
     let outputs = (0..record.outputs())
         .map(|output| {
@@ -133,14 +135,14 @@ fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<dra
                 let Ok(predicted) = &v.records[k].predicted else { continue };
                 let values = predicted.col_as_slice(output);
                 let residual: Vec<f64> = measured.iter().zip(values).map(|(y, yp)| y - yp).collect();
-                predictions.push(draw::Prediction {
+                predictions.push(data::DrawnPrediction {
                     method: v.method.key().into(),
                     predicted: Trace::new(name, values, &clock)?,
                     residual: Trace::new(name, &residual, &clock)?,
                 });
             }
-            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, &measured, &clock)?, predictions })
+            Ok(data::VerifiedOutput { output, measured: Trace::new(name, &measured, &clock)?, predictions })
         })
         .collect::<Result<_>>()?;
-    Ok(draw::Verification { record: record.name().to_owned(), prediction: prediction.into(), clock, outputs })
+    Ok(data::Verification { record: record.name().to_owned(), prediction: prediction.into(), clock, outputs })
 }

@@ -5,17 +5,17 @@ use crate::{Error, Result};
 use std::f64::consts::TAU;
 use youla::lti::{SharedMode, frequency_response};
 use youla_loop::redesign::{LoopFigures, Redesign, TriedWeight};
-use youla_report::data::{self as draw, EvidenceTable, Method, ReportPart, Role, Status, Verdict};
+use youla_report::data::{self, DrawnMethod, EvidenceTable, LineStatus, MethodRole, ReportPart, Verdict};
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 
 /// The section of the page.
-pub(super) fn drawn(redesign: &Redesign) -> Result<draw::Redesign> {
-    Ok(draw::Redesign { loops: loops().to_vec(), figure: figure(redesign)?, tables: tables(redesign) })
+pub(super) fn drawn(redesign: &Redesign) -> Result<data::DrawnRedesign> {
+    Ok(data::DrawnRedesign { loops: loops().to_vec(), figure: figure(redesign)?, tables: tables(redesign) })
 }
 
 /// What the new controller promises.
 pub(super) fn line(redesign: &Redesign) -> Verdict {
-    let status = if redesign.gains_damping() { Status::Good } else { Status::Caution };
+    let status = if redesign.gains_damping() { LineStatus::Good } else { LineStatus::Caution };
     Verdict { status, text: sentence(redesign), evidence: ReportPart::Redesign }
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn figure(redesign: &Redesign) -> Result<Figure> {
     let hz: Vec<f64> =
         (0..POINTS).map(|k| nyquist * 10f64.powf(-2.5 * (1.0 - (k + 1) as f64 / POINTS as f64))).collect();
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
-    let curve = |method: &Method, figures: &LoopFigures| {
+    let curve = |method: &DrawnMethod, figures: &LoopFigures| {
         let response = frequency_response(&figures.response, &omega)?;
         let gain = response.iter().map(|g| g.singular_values().map_or(f64::NAN, |s| s.first().copied().unwrap_or(0.0)));
         let y = gain.map(decibel).collect();
@@ -123,6 +123,9 @@ pub(crate) fn figure(redesign: &Redesign) -> Result<Figure> {
 }
 
 /// The two loops as the figure names them.
-pub(crate) fn loops() -> [Method; 2] {
-    [Method::new("present", "controller that ran", Role::Nominal), Method::new("new", "new controller", Role::Hansen)]
+pub(crate) fn loops() -> [DrawnMethod; 2] {
+    [
+        DrawnMethod::new("present", "controller that ran", MethodRole::Nominal),
+        DrawnMethod::new("new", "new controller", MethodRole::Hansen),
+    ]
 }

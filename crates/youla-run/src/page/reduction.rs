@@ -3,7 +3,7 @@
 use crate::stages::reduction::RunReduction;
 use crate::summary::reduction::orders;
 use youla::reduce::ReductionMethod;
-use youla_report::data::{Reduction, ReportPart, Status, Verdict};
+use youla_report::data::{DrawnReduction, LineStatus, ReportPart, Verdict};
 
 /// Closed-loop error from which a reduction is to be looked at.
 /// The demonstration reduced from 16 to 6 states has 0.054 (`docs/reduction.md`). Chosen, not measured.
@@ -13,16 +13,16 @@ pub(super) fn line(run: &RunReduction) -> Verdict {
     let found = &run.found;
     let error = found.row().and_then(|row| row.closed_loop);
     let status = match (found.stabilised, error) {
-        (false, _) => Status::Bad,
-        (true, Some(error)) if error < LARGE_ERROR && found.reduction.unstable_pole.is_none() => Status::Good,
-        _ => Status::Caution,
+        (false, _) => LineStatus::Bad,
+        (true, Some(error)) if error < LARGE_ERROR && found.reduction.unstable_pole.is_none() => LineStatus::Good,
+        _ => LineStatus::Caution,
     };
     Verdict { status, text: found.sentence(), evidence: ReportPart::Reduction }
 }
 
-pub(super) fn drawn(run: &RunReduction) -> Reduction {
+pub(super) fn drawn(run: &RunReduction) -> DrawnReduction {
     let r = &run.found.reduction;
-    Reduction {
+    DrawnReduction {
         label: format!("the recommended model by {}", r.method),
         hankel: r.hankel.clone(),
         chosen: run.found.order(),

@@ -1,19 +1,19 @@
 //! Tests of the residuals in the report.
 
 use crate::result::Identification;
-use crate::settings::Prediction;
+use crate::settings::PredictionKind;
 use crate::stages::validate::residuals::ResidualPredictor;
 use youla::validate::{PREDICTION_STEPS, ResidualCorrelations};
-use youla_report::data as draw;
+use youla_report::data;
 
 /// What the report draws.
-pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
+pub(crate) fn drawn(found: &Identification) -> Option<data::Residuals> {
     let mut tests = Vec::new();
     for v in &found.validation.models {
         for record in &v.records {
             // A residual or an excitation that is zero throughout has no correlations; `residuals.json` says so by null.
             let Some(r) = record.residuals.as_ref().filter(|r| exist(&r.correlations)) else { continue };
-            tests.push(draw::ResidualTest {
+            tests.push(data::DrawnResidualTest {
                 record: record.record.clone(),
                 method: v.method.key().into(),
                 excitations: r.excitations.clone(),
@@ -22,9 +22,9 @@ pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
                     .correlations
                     .auto
                     .iter()
-                    .map(|values| draw::Correlation::new(values, r.correlations.auto_band))
+                    .map(|values| data::Correlation::new(values, r.correlations.auto_band))
                     .collect(),
-                cross: r.correlations.cross.iter().map(|c| draw::Correlation::new(&c.values, c.band)).collect(),
+                cross: r.correlations.cross.iter().map(|c| data::Correlation::new(&c.values, c.band)).collect(),
                 k_step_fits: r
                     .k_step_fits
                     .iter()
@@ -38,10 +38,10 @@ pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
         }
     }
     let of = match found.validation.prediction {
-        Prediction::OpenLoop => "the simulation from the measured input",
-        Prediction::ClosedLoop => "the simulation under the controller from the known excitations",
+        PredictionKind::OpenLoop => "the simulation from the measured input",
+        PredictionKind::ClosedLoop => "the simulation under the controller from the known excitations",
     };
-    (!tests.is_empty()).then(|| draw::Residuals {
+    (!tests.is_empty()).then(|| data::Residuals {
         prediction: of.into(),
         external: found
             .validation

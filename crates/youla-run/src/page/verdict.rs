@@ -8,9 +8,9 @@ use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
 use crate::summary::model::{ModelEntry, ResidualEntry};
-use youla::identify::likelihood::{Evidence, Outcome};
+use youla::identify::likelihood::{Evidence, TestOutcome};
 use youla_loop::check::{Finding, Severity, Test};
-use youla_report::data::{ReportPart, Status, Verdict};
+use youla_report::data::{LineStatus, ReportPart, Verdict};
 use youla_report::numbers;
 
 /// The lines, each with its evidence.
@@ -27,7 +27,7 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
     let line = |status, text: String| Verdict { status, text, evidence: ReportPart::Recommended };
     let model = match &found.recommended {
         Ok(model) => model,
-        Err(reason) => return vec![line(Status::Bad, no_model(found, reason))],
+        Err(reason) => return vec![line(LineStatus::Bad, no_model(found, reason))],
     };
     let dead_time = match &model.dead_time[..] {
         delays if delays.iter().all(|d| *d == 0) => String::new(),
@@ -39,11 +39,11 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
     };
     let what = format!("The recommended model has order {}{dead_time}", model.order);
     let failed: Vec<&Evidence> = model.evidence.iter().filter(|e| !e.holds()).collect();
-    let status = if failed.is_empty() { Status::Good } else { Status::Bad };
+    let status = if failed.is_empty() { LineStatus::Good } else { LineStatus::Bad };
     let first = line(status, format!("{} {what}.", model.sentence()));
-    let named = model.evidence.iter().filter(|e| !e.required && e.outcome == Outcome::Failed);
-    let named = named.map(|e| line(Status::Caution, format!("{e}.")));
-    let failed = failed.into_iter().map(|e| line(Status::Bad, format!("{e}.")));
+    let named = model.evidence.iter().filter(|e| !e.required && e.outcome == TestOutcome::Failed);
+    let named = named.map(|e| line(LineStatus::Caution, format!("{e}.")));
+    let failed = failed.into_iter().map(|e| line(LineStatus::Bad, format!("{e}.")));
     std::iter::once(first).chain(failed).chain(named).collect()
 }
 
@@ -93,7 +93,7 @@ fn unnoticed_line(found: &Identification) -> Option<Verdict> {
     let text = "No excitation is declared, so these errors could not be noticed: a wrong gain, sign or delay of [controller]; u and y \
                 shifted against each other; exchanged channels; noise taken for excitation. Declare `input_excitation` or `reference` \
                 in [data].";
-    unknown.then(|| Verdict { status: Status::Caution, text: text.into(), evidence: ReportPart::Signals })
+    unknown.then(|| Verdict { status: LineStatus::Caution, text: text.into(), evidence: ReportPart::Signals })
 }
 
 /// Whether the residual depends on what excited the loop; nothing without a verification record.
@@ -107,16 +107,16 @@ fn residual_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         let text = format!(
             "No external excitation is known, so the residuals of {name} were not tested for dependence on it."
         );
-        (Status::Caution, text)
+        (LineStatus::Caution, text)
     } else if dependent().next().is_none() {
         let text = format!(
             "The residual of {name} on fresh data does not depend on past excitation: no missing dynamics detected."
         );
-        (Status::Good, text)
+        (LineStatus::Good, text)
     } else if dependent().all(explained) {
         let text =
             format!("{name} explains 99.9 % of the output on fresh data; what is left is too small to judge by.");
-        (Status::Good, capital(&text))
+        (LineStatus::Good, capital(&text))
     } else {
         let at = worst.largest.as_ref()?;
         let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
@@ -127,7 +127,7 @@ fn residual_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
             at.lag,
             at.deviations.map_or(f64::NAN, f64::abs)
         );
-        (Status::Caution, text)
+        (LineStatus::Caution, text)
     };
     Some(Verdict { status, text, evidence: ReportPart::Residuals })
 }
@@ -159,9 +159,9 @@ fn data_line(found: &Identification) -> Option<Verdict> {
     };
     let (defects, warnings) = (count(Severity::Defect, false), count(Severity::Caution, false));
     let of_check = match (defects, warnings) {
-        (0, 0) => Status::Good,
-        (0, _) => Status::Caution,
-        _ => Status::Bad,
+        (0, 0) => LineStatus::Good,
+        (0, _) => LineStatus::Caution,
+        _ => LineStatus::Bad,
     };
     let checked = counts([
         (defects, "data defect"),
@@ -191,17 +191,17 @@ fn counts(kinds: [(usize, &str); 3]) -> String {
 }
 
 /// What the check of the data says of the declared controller.
-fn controller_sentence(found: &Identification) -> (String, Status) {
+fn controller_sentence(found: &Identification) -> (String, LineStatus) {
     if found.declared.controller().is_zero() {
-        return ("No controller ran.".into(), Status::Good);
+        return ("No controller ran.".into(), LineStatus::Good);
     }
     let Some(finding) = found.data.controller() else { return of_alpha(found) };
     let status = match finding.severity {
         // a note without a remedy: the controller agrees
-        Severity::Note if finding.advice.is_empty() => Status::Good,
-        Severity::Note => Status::Info,
-        Severity::Caution => Status::Caution,
-        Severity::Defect => Status::Bad,
+        Severity::Note if finding.advice.is_empty() => LineStatus::Good,
+        Severity::Note => LineStatus::Info,
+        Severity::Caution => LineStatus::Caution,
+        Severity::Defect => LineStatus::Bad,
     };
     let told = finding.numbers.contains_key("residual_after");
     let advice = if told { format!(" {}.", finding.advice) } else { String::new() };
@@ -209,18 +209,18 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
 }
 
 /// The same from the alpha that the factors give, where alpha itself was logged.
-fn of_alpha(found: &Identification) -> (String, Status) {
+fn of_alpha(found: &Identification) -> (String, LineStatus) {
     match found.controller_mismatch() {
         None => {
             let text = "No excitation is declared, so the declared controller could not be verified against the log.";
-            (text.into(), Status::Info)
+            (text.into(), LineStatus::Info)
         }
         Some(m) => {
             // The thresholds `controller_caution` and `controller_defect` of the check of the data.
             let (status, words) = match m {
-                m if m < 0.01 => (Status::Good, "explains the logged input"),
-                m if m < 0.1 => (Status::Caution, "explains the logged input only roughly"),
-                _ => (Status::Bad, "does not explain the logged input; check its sign, delay and saturation"),
+                m if m < 0.01 => (LineStatus::Good, "explains the logged input"),
+                m if m < 0.1 => (LineStatus::Caution, "explains the logged input only roughly"),
+                _ => (LineStatus::Bad, "does not explain the logged input; check its sign, delay and saturation"),
             };
             (format!("The declared controller {words} (relative error of alpha {m:.1e})."), status)
         }
@@ -235,13 +235,13 @@ fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     let (method, model) = subject(found, summary)?;
     let (name, size) = (name(method), model.worst_closed_loop_pole().map_or(0.0, |[re, im]| re.hypot(im)));
     let (status, verb, adjective) = match model.stabilised_by_controller {
-        true if 1.0 - size < ROUNDING => (Status::Caution, "stabilises", "stable"),
-        true => (Status::Good, "stabilises", "stable"),
-        false => (Status::Bad, "does not stabilise", "unstable"),
+        true if 1.0 - size < ROUNDING => (LineStatus::Caution, "stabilises", "stable"),
+        true => (LineStatus::Good, "stabilises", "stable"),
+        false => (LineStatus::Bad, "does not stabilise", "unstable"),
     };
     let worst = numbers::radius(size);
     let near = match status {
-        Status::Caution => ", which rounding does not tell from 1: the loop may have a mode that does not decay",
+        LineStatus::Caution => ", which rounding does not tell from 1: the loop may have a mode that does not decay",
         _ => "",
     };
     let text = match found.declared.controller().is_zero() {

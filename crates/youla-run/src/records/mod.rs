@@ -19,7 +19,7 @@ use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::{Channel, LoopRecord, Record};
 use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256, sha256_of};
-pub use youla_report::data::Source as SourceFile;
+pub use youla_report::data::SourceFile;
 
 /// All records of a run.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! `[grey_box]`: a physical structure and how it is compared with the data.
 
-use super::options::Prediction;
+use super::options::PredictionKind;
 use serde::{Deserialize, Serialize};
 use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, NoiseKind};
 
@@ -13,7 +13,7 @@ pub struct GreyBoxSettings {
     /// What is compared with the outputs: the plant alone, driven by the measured u, or the loop with the declared controller,
     /// driven by the known excitations.
     #[serde(default)]
-    pub prediction: Prediction,
+    pub prediction: PredictionKind,
     /// The model of the noise.
     #[serde(default)]
     pub noise: NoiseKind,
@@ -46,7 +46,7 @@ impl GreyBoxSettings {
     pub fn new(structure: Declaration) -> Self {
         GreyBoxSettings {
             structure,
-            prediction: Prediction::default(),
+            prediction: PredictionKind::default(),
             noise: NoiseKind::default(),
             delays: Vec::new(),
             alternative: Vec::new(),

@@ -23,7 +23,7 @@ pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use feedback::Feedback;
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
 pub use models::{Domain, NominalModel, Polynomials};
-pub use options::{FactorSettings, FrequencySettings, Prediction, VerificationSettings};
+pub use options::{FactorSettings, FrequencySettings, PredictionKind, VerificationSettings};
 pub use pid::{Discretisation, IdealPid, LoopGain, ParallelPid};
 pub use places::tables_with;
 
@@ -257,13 +257,13 @@ impl RunSettings {
 
     fn loop_problem(&self) -> Option<String> {
         let known = self.data.excitation_is_known();
-        if self.verification.prediction == Some(Prediction::ClosedLoop) && !known {
+        if self.verification.prediction == Some(PredictionKind::ClosedLoop) && !known {
             return Some(
                 "[verification] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha"
                     .into(),
             );
         }
-        let of_structure = self.grey_box.as_ref().is_some_and(|g| g.prediction == Prediction::ClosedLoop);
+        let of_structure = self.grey_box.as_ref().is_some_and(|g| g.prediction == PredictionKind::ClosedLoop);
         if of_structure && !known {
             return Some(
                 "[grey_box] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha".into(),

@@ -24,7 +24,7 @@ impl Default for FactorSettings {
 /// How a model predicts a verification record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Prediction {
+pub enum PredictionKind {
     /// The model under the actual controller, driven by the known excitations alone. The only fair test for unstable or
     /// integrating plants.
     ClosedLoop,
@@ -40,7 +40,7 @@ pub struct VerificationSettings {
     /// What drives the models. When absent, `"closed-loop"` where an excitation is known and the nominal model is unstable or
     /// integrates, as its simulation from u would leave all bounds; `"open-loop"` otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub prediction: Option<Prediction>,
+    pub prediction: Option<PredictionKind>,
     /// Samples at the start of each record that do not count in the fit (transient of unknown initial states).
     pub skip: usize,
 }

@@ -1,7 +1,7 @@
 //! What the stages of a run take: what was asked for, the records, the loop that ran, and its coprime factors.
 
 use crate::records::RunRecords;
-use crate::settings::{Prediction, RunSettings};
+use crate::settings::{PredictionKind, RunSettings};
 use crate::stages::factors::{DeclaredLoop, LoopFactors};
 use crate::stages::signals::DeviationSignals;
 
@@ -20,14 +20,14 @@ pub(crate) struct RunContext<'a> {
 
 impl RunContext<'_> {
     /// What drives the models on verification records: as stated, or what suits the nominal model and what is known.
-    pub(crate) fn prediction(&self) -> Prediction {
+    pub(crate) fn prediction(&self) -> PredictionKind {
         let data = &self.settings.data;
         // A known alpha drives the loop through the factors.
         let driven = if data.alpha.is_empty() { data.excitation_is_known() } else { self.factorisation.is_some() };
         // Without a nominal model the factors are those of the recommended one.
         let of_factors = || Some(self.factorisation?.factors.nominal());
         let bounded = self.declared.nominal.as_ref().or_else(of_factors).is_none_or(|g| g.is_stable().unwrap_or(true));
-        let suits = if driven && !bounded { Prediction::ClosedLoop } else { Prediction::OpenLoop };
+        let suits = if driven && !bounded { PredictionKind::ClosedLoop } else { PredictionKind::OpenLoop };
         self.settings.verification.prediction.unwrap_or(suits)
     }
 }

@@ -5,7 +5,7 @@ use crate::stages::validate::residue_at;
 use crate::summary::entries::{ModeEntry, RealPoleEntry, apart, finite, pairs};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Evidence, ModeEstimate, Outcome, Predictor, Recommendation, RegionParts};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, RegionParts, TestOutcome};
 use youla::lti::{Continuous, StateSpace};
 use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
@@ -107,9 +107,9 @@ pub struct TestEntry {
 impl From<&Evidence> for TestEntry {
     fn from(e: &Evidence) -> Self {
         let outcome = match e.outcome {
-            Outcome::Passed => "passed",
-            Outcome::Failed => "failed",
-            Outcome::NotTested => "not-tested",
+            TestOutcome::Passed => "passed",
+            TestOutcome::Failed => "failed",
+            TestOutcome::NotTested => "not-tested",
         };
         TestEntry {
             question: e.question.clone(),

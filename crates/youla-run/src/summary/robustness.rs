@@ -7,7 +7,7 @@ use crate::stages::validate::robustness::LoopRobustness;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use youla::control::{self, Margins, NuGap};
-use youla_report::data::{DiskMargin, Robustness};
+use youla_report::data::{DrawnDiskMargin, Robustness};
 
 /// The entry `robustness` of a model.
 pub(crate) fn robustness(of: &LoopRobustness) -> Robustness {
@@ -34,8 +34,8 @@ pub(crate) fn robustness(of: &LoopRobustness) -> Robustness {
     }
 }
 
-fn disk(disk: &control::DiskMargin) -> DiskMargin {
-    DiskMargin {
+fn disk(disk: &control::DiskMargin) -> DrawnDiskMargin {
+    DrawnDiskMargin {
         alpha: finite(disk.alpha),
         lowest_gain: finite(disk.lowest_gain),
         highest_gain: disk.highest_gain,

@@ -21,7 +21,7 @@ use youla_loop::check::CheckOptions;
 use youla_loop::redesign::RedesignOptions;
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
-    DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings, VerificationSettings,
+    DataFile, DataSettings, FactorSettings, FrequencySettings, PredictionKind, RunSettings, VerificationSettings,
 };
 use youla_run::{RunRecords, SourceFile};
 
@@ -174,7 +174,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         grey_box: None,
         redesign: Some(RedesignOptions::default()),
         check: CheckOptions::default(),
-        verification: VerificationSettings { prediction: Some(Prediction::OpenLoop), skip: 0 },
+        verification: VerificationSettings { prediction: Some(PredictionKind::OpenLoop), skip: 0 },
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },
         seed: Some(seed),
     }

@@ -8,7 +8,7 @@ use youla_run::{RunRecords, RunSettings};
 
 /// The machines that can be simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Machine {
+pub enum DemoMachine {
     /// A levitated mass, unstable, under a PD controller with strong sensor noise.
     Levitation,
     /// The gas bearing of the paper, 2 x 2, with a nominal model of half the true A.
@@ -28,9 +28,9 @@ pub struct Demo {
 ///
 /// # Errors
 /// Never for the parameters that are built in.
-pub fn demo(machine: Machine, seed: u64) -> Result<Demo> {
+pub fn demo(machine: DemoMachine, seed: u64) -> Result<Demo> {
     match machine {
-        Machine::Levitation => levitation::levitation(seed),
-        Machine::Bearing => bearing::bearing(seed),
+        DemoMachine::Levitation => levitation::levitation(seed),
+        DemoMachine::Bearing => bearing::bearing(seed),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::drive::Actuation;
 use super::parameters::Safety;
-use super::twin::Rig;
+use super::twin::SimulatedRig;
 use crate::Result;
 use youla::linalg::{check_finite, check_shape};
 use youla::lti::Discrete;
@@ -96,7 +96,7 @@ pub struct ExperimentRecord {
 /// # Ok::<(), youla_twin::Error>(())
 /// ```
 pub fn run_experiment(
-    rig: &mut impl Rig,
+    rig: &mut impl SimulatedRig,
     controller: &mut impl LoopController,
     alpha: MatRef<'_, f64>,
     safety: &Safety,

@@ -25,4 +25,4 @@ pub use parameters::{
 pub use piezo::Piezo;
 pub use speed::bearing_at_speed;
 pub use structure::BearingStructure;
-pub use twin::{BearingRig, Fidelity, Rig};
+pub use twin::{BearingRig, Fidelity, SimulatedRig};

@@ -28,7 +28,7 @@ pub enum Fidelity {
 }
 
 /// A machine under a sampled controller. Every sample: measure, compute, actuate.
-pub trait Rig {
+pub trait SimulatedRig {
     /// The clock.
     fn time(&self) -> Discrete;
 
@@ -39,14 +39,14 @@ pub trait Rig {
     fn actuate(&mut self, u: [f64; 2]) -> Actuation;
 }
 
-/// The gas bearing of [`RigParameters`] as a [`Rig`], at rest at first.
+/// The gas bearing of [`RigParameters`] as a [`SimulatedRig`], at rest at first.
 ///
 /// The same parameters, level, seed and commands give the same bits. Nothing is allocated per sample. The linear level is
 /// the exact zero-order-hold discretisation (held to 1e-12 by `the_linear_level_is_the_closed_loop`); above it the plant
 /// moves in substeps, 20 us with the parameters that ship.
 ///
 /// ```
-/// use youla_twin::rig::{BearingRig, Fidelity, Rig, RigParameters};
+/// use youla_twin::rig::{BearingRig, Fidelity, SimulatedRig, RigParameters};
 /// let mut rig = BearingRig::new(&RigParameters::shipped(), Fidelity::Rotating { rpm: 2500.0 }, 1)?;
 /// let y = rig.measure();
 /// let step = rig.actuate([-0.1 * y[0], 7.0]);
@@ -127,7 +127,7 @@ impl BearingRig {
     }
 }
 
-impl Rig for BearingRig {
+impl SimulatedRig for BearingRig {
     fn time(&self) -> Discrete {
         self.time
     }

@@ -34,16 +34,16 @@ pub struct Seconds(pub f64);
 
 impl std::fmt::Display for Seconds {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        Value(format!("{:.9e}", self.0).parse().unwrap_or(self.0)).fmt(f)
+        FullNumber(format!("{:.9e}", self.0).parse().unwrap_or(self.0)).fmt(f)
     }
 }
 
 /// Prints a number in full, or as a power of ten where that takes too many digits.
-pub struct Value(pub f64);
+pub struct FullNumber(pub f64);
 
-impl std::fmt::Display for Value {
+impl std::fmt::Display for FullNumber {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Value(v) = *self;
+        let FullNumber(v) = *self;
         if v == 0.0 || !v.is_finite() || (1e-9..1e15).contains(&v.abs()) {
             write!(f, "{v}")
         } else {

@@ -9,7 +9,7 @@ mod display;
 mod limits;
 mod names;
 
-pub use display::{Names, Pole, Seconds, Value, short};
+pub use display::{FullNumber, Names, Pole, Seconds, short};
 pub use limits::OrderLimit;
 pub use names::{misspelt, nearest_name};
 
@@ -61,7 +61,7 @@ pub enum Error {
         column: usize,
     },
     /// A quantity lies outside of the range in which it has a meaning.
-    #[error("{what} is {}, but must be {must}", Value(*value))]
+    #[error("{what} is {}, but must be {must}", FullNumber(*value))]
     OutOfRange {
         /// Which quantity.
         what: String,

@@ -50,7 +50,7 @@ pub fn merge(parts: &[PathBuf], target: &Path) -> Result<Configuration> {
 
 /// The rows of all parts of one file.
 fn joined(parts: &[&PathBuf], file: &str, total: usize, whole: &Configuration) -> Result<String> {
-    let mut text = format!("{}\n", crate::study::Row::HEADER);
+    let mut text = format!("{}\n", crate::study::StudyRow::HEADER);
     for (k, part) in parts.iter().enumerate() {
         let items = Shard::new(k + 1, parts.len())?.items(total);
         let path = part.join(file);

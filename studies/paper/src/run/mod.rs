@@ -9,8 +9,8 @@ pub use merge::merge;
 
 use crate::story::{Claim, paper_claims};
 use crate::study::{
-    Campaign, Evaluated, Item, Method, Outcome, Paper, PaperSettings, PaperTiming, Row, Status, crossover,
-    crossover_items, evaluate, experiments, monte_carlo,
+    CampaignOutcome, Evaluated, Item, Paper, PaperSettings, PaperTiming, RowStatus, StudyCampaign, StudyMethod,
+    StudyRow, crossover, crossover_items, evaluate, experiments, monte_carlo,
 };
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -110,7 +110,7 @@ fn study_loops(
     configuration: &Configuration,
     target: &Path,
     notify: &(dyn Fn(PaperProgress<'_>) + Sync),
-) -> Result<Outcome> {
+) -> Result<CampaignOutcome> {
     let Configuration { settings, rig, .. } = configuration;
     let noise = rig.sensor.noise.value;
     let evaluate = |index: usize| {
@@ -125,7 +125,7 @@ fn map_loops(
     configuration: &Configuration,
     target: &Path,
     notify: &(dyn Fn(PaperProgress<'_>) + Sync),
-) -> Result<Outcome> {
+) -> Result<CampaignOutcome> {
     let settings = &configuration.settings;
     let evaluate = |index: usize| {
         let item = crossover(settings, index);
@@ -145,7 +145,7 @@ fn evaluate_item(item: &Item, configuration: &Configuration) -> Result<Evaluated
 
 /// The rows of a cell of the map in which no controller keeps the margin.
 fn without_controller(item: &Item, settings: &PaperSettings) -> Evaluated {
-    let row = |method: Method| Row {
+    let row = |method: StudyMethod| StudyRow {
         item: item.index,
         theta: item.theta,
         noise: item.noise,
@@ -153,7 +153,7 @@ fn without_controller(item: &Item, settings: &PaperSettings) -> Evaluated {
         peak_nominal: f64::NAN,
         peak_plant: f64::NAN,
         method,
-        status: Status::NoController,
+        status: RowStatus::NoController,
         fit: [f64::NAN; 2],
         steps: None,
         note: String::new(),
@@ -168,12 +168,12 @@ fn run_campaign(
     total: usize,
     evaluate: impl Fn(usize) -> Result<Evaluated> + Sync,
     notify: &(dyn Fn(PaperProgress<'_>) + Sync),
-) -> Result<Outcome> {
+) -> Result<CampaignOutcome> {
     let file = match stage {
         PaperStage::Study => results::STUDY,
         _ => results::CROSSOVER,
     };
-    let campaign = Campaign {
+    let campaign = StudyCampaign {
         path: target.join(file),
         items: configuration.shard.items(total),
         rows_per_item: configuration.settings.compared().count(),
@@ -199,7 +199,7 @@ impl Clock {
         result
     }
 
-    fn timing(&self, settings: &PaperSettings, outcomes: &[&Outcome]) -> PaperTiming {
+    fn timing(&self, settings: &PaperSettings, outcomes: &[&CampaignOutcome]) -> PaperTiming {
         let loops: usize = outcomes.iter().map(|o| o.computed).sum();
         let mean = |part: usize| {
             let seconds: f64 = outcomes.iter().filter_map(|o| o.durations.get(part)).map(|d| d.as_secs_f64()).sum();

@@ -3,7 +3,7 @@
 use super::claims::{Claim, ClaimOutcome, SIMILAR};
 use super::figures_experiments::{fit_of, of};
 use super::words::{both, fixed, percent, short};
-use crate::study::{Method, Paper, StudyExperiment, TIE};
+use crate::study::{Paper, StudyExperiment, StudyMethod, TIE};
 use youla::Mat;
 
 /// All of them; the keys are those of the experiments.
@@ -25,7 +25,7 @@ pub(super) fn claims(paper: &Paper) -> Vec<Claim> {
 }
 
 /// Lead of one method over another per axis, percentage points.
-pub(super) fn lead(experiment: &StudyExperiment, of: Method, over: Method) -> [f64; 2] {
+pub(super) fn lead(experiment: &StudyExperiment, of: StudyMethod, over: StudyMethod) -> [f64; 2] {
     let (a, b) = (fit_of(experiment, of), fit_of(experiment, over));
     [a[0] - b[0], a[1] - b[1]]
 }
@@ -38,8 +38,8 @@ pub(super) fn points([h, v]: [f64; 2]) -> String {
 fn high_deviation(experiment: &StudyExperiment) -> Claim {
     let published = experiment.case.published;
     let theirs = [0, 1].map(|i| published[2][i] - published[1][i]);
-    let ours = lead(experiment, Method::Hansen, Method::Pem);
-    let several = lead(experiment, Method::Hansen, Method::PemMultiStart);
+    let ours = lead(experiment, StudyMethod::Hansen, StudyMethod::Pem);
+    let several = lead(experiment, StudyMethod::Hansen, StudyMethod::PemMultiStart);
     let in_size = [0, 1].map(|i| ours[i] >= 0.5 * theirs[i]);
     let in_sign = ours.iter().all(|d| *d >= TIE);
     let outcome = match ClaimOutcome::of(&in_size) {
@@ -60,7 +60,7 @@ fn high_deviation(experiment: &StudyExperiment) -> Claim {
 }
 
 fn speed(experiment: &StudyExperiment) -> Claim {
-    let gains = [Method::Pem, Method::Hansen].map(|m| lead(experiment, m, Method::Nominal));
+    let gains = [StudyMethod::Pem, StudyMethod::Hansen].map(|m| lead(experiment, m, StudyMethod::Nominal));
     let higher: Vec<bool> = gains.iter().flatten().map(|gain| *gain >= TIE).collect();
     let text = format!(
         "{}: over the nominal model PEM gains {} and Hansen {}.",
@@ -73,12 +73,12 @@ fn speed(experiment: &StudyExperiment) -> Claim {
 }
 
 fn similar(experiment: &StudyExperiment) -> Claim {
-    let ahead = lead(experiment, Method::Hansen, Method::Pem);
+    let ahead = lead(experiment, StudyMethod::Hansen, StudyMethod::Pem);
     let text = format!(
         "{}: PEM reaches {}, Hansen {} (similar means up to {SIMILAR} points apart).",
         experiment.case.title,
-        both(fit_of(experiment, Method::Pem)),
-        both(fit_of(experiment, Method::Hansen))
+        both(fit_of(experiment, StudyMethod::Pem)),
+        both(fit_of(experiment, StudyMethod::Hansen))
     );
     let outcome = ClaimOutcome::of(&ahead.map(|d| d.abs() <= SIMILAR));
     let claim = "With a small deviation (A x 0.97) PEM and the Hansen scheme give similar fits.";
@@ -86,7 +86,7 @@ fn similar(experiment: &StudyExperiment) -> Claim {
 }
 
 fn vertical(experiment: &StudyExperiment) -> Claim {
-    let gains = [Method::Pem, Method::Hansen].map(|m| lead(experiment, m, Method::Nominal));
+    let gains = [StudyMethod::Pem, StudyMethod::Hansen].map(|m| lead(experiment, m, StudyMethod::Nominal));
     let text = format!(
         "{}: horizontal and vertical, PEM gains {} over the nominal model and Hansen {}.",
         experiment.case.title,
@@ -125,18 +125,18 @@ fn explained(measured: &Mat<f64>, predicted: &Mat<f64>, i: usize) -> f64 {
 }
 
 fn reduction(list: &[StudyExperiment]) -> Claim {
-    let losses = list.iter().flat_map(|e| lead(e, Method::Hansen, Method::HansenReduced)).collect::<Vec<_>>();
+    let losses = list.iter().flat_map(|e| lead(e, StudyMethod::Hansen, StudyMethod::HansenReduced)).collect::<Vec<_>>();
     let greatest =
         losses.iter().copied().fold(f64::NEG_INFINITY, |a, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
-    let orders = |m: Method| {
+    let orders = |m: StudyMethod| {
         let found = list.iter().filter_map(|e| of(e, m)?.model.as_ref().ok().map(|g| g.order()));
         found.max().map_or_else(|| "none".into(), |n| short(n as f64, 3))
     };
     let text = format!(
         "From order {} to order {} the fit falls by at most {} points over the six columns of Table 1 (similar means up to \
          {SIMILAR}).",
-        orders(Method::Hansen),
-        orders(Method::HansenReduced),
+        orders(StudyMethod::Hansen),
+        orders(StudyMethod::HansenReduced),
         percent(greatest.max(0.0), 1)
     );
     let claim = "Reduction to the order of the nominal model keeps a similar fit.";

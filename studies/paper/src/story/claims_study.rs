@@ -3,7 +3,7 @@
 use super::claims::{Claim, ClaimOutcome, SIMILAR};
 use super::map;
 use super::words::{AXES, and, both, count, percent, range, short};
-use crate::study::{Decile, Method, Paper, Row, Status, TIE, deciles, overall, quantile};
+use crate::study::{Decile, Paper, RowStatus, StudyMethod, StudyRow, TIE, deciles, overall, quantile};
 
 /// All of them.
 pub(super) fn claims(paper: &Paper) -> Vec<Claim> {
@@ -16,8 +16,8 @@ fn unknown(claim: Claim) -> Claim {
 
 /// Tenths of theta with loops: PEM and Hansen.
 fn tenths(paper: &Paper) -> Vec<(Decile, Decile)> {
-    let of = |m: Method| deciles(&paper.study, m, paper.settings.study.theta);
-    of(Method::Pem).into_iter().zip(of(Method::Hansen)).filter(|(p, h)| p.count > 0 && h.count > 0).collect()
+    let of = |m: StudyMethod| deciles(&paper.study, m, paper.settings.study.theta);
+    of(StudyMethod::Pem).into_iter().zip(of(StudyMethod::Hansen)).filter(|(p, h)| p.count > 0 && h.count > 0).collect()
 }
 
 fn small_deviations(paper: &Paper) -> Claim {
@@ -69,12 +69,12 @@ fn large_deviations(paper: &Paper) -> Claim {
         Some((from, _)) => format!("From theta = {} on PEM is behind in every tenth; {end}", short(from.theta[0], 3)),
         None => format!("PEM does not fall behind; {end}"),
     };
-    let text = format!("{head}. {}, {}.", failures(paper, Method::Pem), failures(paper, Method::Hansen));
+    let text = format!("{head}. {}, {}.", failures(paper, StudyMethod::Pem), failures(paper, StudyMethod::Hansen));
     Claim { outcome: ClaimOutcome::of(&[behind.is_some()]), text, ..claim }
 }
 
 /// `PEM leaves no usable model in 12 of 40 loops, the first at theta = 0.52`.
-fn failures(paper: &Paper, method: Method) -> String {
+fn failures(paper: &Paper, method: StudyMethod) -> String {
     let all = overall(&paper.study, method, paper.settings.study.theta);
     let failed = paper.study.iter().filter(|r| r.method == method && r.failed());
     let first = failed.map(|r| r.theta).min_by(f64::total_cmp);
@@ -87,7 +87,7 @@ fn failures(paper: &Paper, method: Method) -> String {
     )
 }
 
-fn rows(paper: &Paper, method: Method) -> Vec<&Row> {
+fn rows(paper: &Paper, method: StudyMethod) -> Vec<&StudyRow> {
     paper.study.iter().filter(|r| r.method == method).collect()
 }
 
@@ -99,11 +99,11 @@ fn medians(paper: &Paper) -> Claim {
         outcome: ClaimOutcome::Fails,
         text: String::new(),
     };
-    if rows(paper, Method::Direct).is_empty() || rows(paper, Method::Hansen).is_empty() {
+    if rows(paper, StudyMethod::Direct).is_empty() || rows(paper, StudyMethod::Hansen).is_empty() {
         return unknown(claim);
     }
-    let of = |m: Method| overall(&paper.study, m, paper.settings.study.theta).median;
-    let (direct, hansen) = (of(Method::Direct), of(Method::Hansen));
+    let of = |m: StudyMethod| overall(&paper.study, m, paper.settings.study.theta).median;
+    let (direct, hansen) = (of(StudyMethod::Direct), of(StudyMethod::Hansen));
     let higher = [0, 1].map(|i| hansen[i] - direct[i] >= TIE);
     let text = format!(
         "At a noise of {} um rms the medians (horizontal and vertical) are {} for Hansen and {} for direct \
@@ -120,7 +120,7 @@ fn medians(paper: &Paper) -> Claim {
 fn noise_level(paper: &Paper) -> String {
     let cells = map::cells(paper);
     let leads: Vec<(f64, f64)> =
-        cells.iter().filter_map(|c| Some((c.at[1], c.lead(Method::Hansen, Method::Direct)?))).collect();
+        cells.iter().filter_map(|c| Some((c.at[1], c.lead(StudyMethod::Hansen, StudyMethod::Direct)?))).collect();
     let ahead = leads.iter().filter(|(_, lead)| *lead >= TIE);
     match ahead.clone().map(|(noise, _)| *noise).min_by(f64::total_cmp) {
         Some(noise) => format!(
@@ -141,16 +141,16 @@ fn spread(paper: &Paper) -> Claim {
         outcome: ClaimOutcome::Fails,
         text: String::new(),
     };
-    if rows(paper, Method::Direct).is_empty() || rows(paper, Method::Hansen).is_empty() {
+    if rows(paper, StudyMethod::Direct).is_empty() || rows(paper, StudyMethod::Hansen).is_empty() {
         return unknown(claim);
     }
-    let quartiles = |m: Method, i: usize| {
+    let quartiles = |m: StudyMethod, i: usize| {
         let fits: Vec<f64> = rows(paper, m).iter().map(|r| r.fit[i]).collect();
         quantile(&fits, 0.75) - quantile(&fits, 0.25)
     };
     let points = |v: f64| if v.is_finite() { percent(v, 1) } else { "unbounded".into() };
     let axis = |i: usize| {
-        let (direct, hansen) = (quartiles(Method::Direct, i), quartiles(Method::Hansen, i));
+        let (direct, hansen) = (quartiles(StudyMethod::Direct, i), quartiles(StudyMethod::Hansen, i));
         (direct > hansen, format!("{} {} against {}", AXES[i], points(direct), points(hansen)))
     };
     let found = [axis(0), axis(1)];
@@ -172,12 +172,12 @@ fn stability(paper: &Paper) -> Claim {
         outcome: ClaimOutcome::Fails,
         text: String::new(),
     };
-    let all = rows(paper, Method::Hansen);
+    let all = rows(paper, StudyMethod::Hansen);
     if all.is_empty() {
         return unknown(claim);
     }
-    let none = all.iter().filter(|r| r.status == Status::Refused).count();
-    let unstable = all.iter().filter(|r| r.status == Status::Unstable).count();
+    let none = all.iter().filter(|r| r.status == RowStatus::Refused).count();
+    let unstable = all.iter().filter(|r| r.status == RowStatus::Unstable).count();
     let reflected = all.iter().filter(|r| r.note.contains("reflected")).count();
     let text = format!(
         "The true S is stable in every loop. Its estimate came out unstable in {reflected} of {}, where its poles were reflected at \

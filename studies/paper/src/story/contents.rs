@@ -5,7 +5,7 @@ use super::sections::{experiments, rig, settings, study, timing};
 use super::tables::{plain, row};
 use super::words::{count, short};
 use crate::Result;
-use crate::study::{Method, Paper};
+use crate::study::{Paper, StudyMethod};
 use youla_report::data;
 use youla_report::figure::Figure;
 use youla_report::story::{Block, Section, Story, Table, section};
@@ -14,20 +14,20 @@ use youla_report::story::{Block, Section, Story, Table, section};
 const TIMING: &str = "timing";
 
 /// The methods of the page in the order in which they are listed and drawn.
-pub fn story_methods() -> Vec<data::Method> {
-    Method::ALL.into_iter().map(drawn).collect()
+pub fn story_methods() -> Vec<data::DrawnMethod> {
+    StudyMethod::ALL.into_iter().map(drawn).collect()
 }
 
-fn drawn(method: Method) -> data::Method {
+fn drawn(method: StudyMethod) -> data::DrawnMethod {
     match method {
-        Method::Nominal => data::Method::nominal(),
-        Method::Pem => data::Method::pem(),
-        Method::PemMultiStart => data::Method::pem_multi_start(),
-        Method::Direct => data::Method::direct(),
-        Method::Hansen => data::Method::hansen(),
-        Method::HansenReduced => data::Method::hansen_reduced(),
-        Method::HansenPem => data::Method::hansen_pem(),
-        Method::Auto => data::Method::new(method.key(), method.label(), data::Role::Recommended),
+        StudyMethod::Nominal => data::DrawnMethod::nominal(),
+        StudyMethod::Pem => data::DrawnMethod::pem(),
+        StudyMethod::PemMultiStart => data::DrawnMethod::pem_multi_start(),
+        StudyMethod::Direct => data::DrawnMethod::direct(),
+        StudyMethod::Hansen => data::DrawnMethod::hansen(),
+        StudyMethod::HansenReduced => data::DrawnMethod::hansen_reduced(),
+        StudyMethod::HansenPem => data::DrawnMethod::hansen_pem(),
+        StudyMethod::Auto => data::DrawnMethod::new(method.key(), method.label(), data::MethodRole::Recommended),
     }
 }
 

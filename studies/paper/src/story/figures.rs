@@ -1,6 +1,6 @@
 //! Parts that the figures share.
 
-use crate::study::Method;
+use crate::study::StudyMethod;
 use youla_report::figure::{Axis, Curve, Drawn};
 
 /// First view of a fit, as in Fig. 4 of the paper.
@@ -27,11 +27,11 @@ pub(super) fn fit_axis(axis_name: &str) -> Axis {
 }
 
 /// A line of a method.
-pub(super) fn line(method: Method, note: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
+pub(super) fn line(method: StudyMethod, note: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
     Curve { method: method.key().into(), note: note.into(), drawn: Drawn::Line, x, y, ..Curve::default() }
 }
 
 /// Points of a method.
-pub(super) fn points(method: Method, note: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
+pub(super) fn points(method: StudyMethod, note: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
     Curve { drawn: Drawn::Points, ..line(method, note, x, y) }
 }

@@ -3,7 +3,7 @@
 use super::figures::{axis, fit_axis, line, logarithmic, points, ranged};
 use super::words::{AXES, both, short};
 use crate::study::ExcitedChannel;
-use crate::study::{ExperimentModel, Method, Paper, Start, StudyExperiment};
+use crate::study::{ExperimentModel, Paper, Start, StudyExperiment, StudyMethod};
 use std::f64::consts::TAU;
 use youla::{Mat, MatRef};
 use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, MEASURED, Panel};
@@ -17,15 +17,15 @@ const ZOOM: f64 = 0.03;
 const ZOOM_RECORD: f64 = 0.2;
 
 /// Models that the figures show.
-const SHOWN: [Method; 3] = [Method::Nominal, Method::Pem, Method::Hansen];
+const SHOWN: [StudyMethod; 3] = [StudyMethod::Nominal, StudyMethod::Pem, StudyMethod::Hansen];
 
 /// The model of a method.
-pub(super) fn of(experiment: &StudyExperiment, method: Method) -> Option<&ExperimentModel> {
+pub(super) fn of(experiment: &StudyExperiment, method: StudyMethod) -> Option<&ExperimentModel> {
     experiment.models.iter().find(|m| m.method == method)
 }
 
 /// Its fit, NaN where there is none.
-pub(super) fn fit_of(experiment: &StudyExperiment, method: Method) -> [f64; 2] {
+pub(super) fn fit_of(experiment: &StudyExperiment, method: StudyMethod) -> [f64; 2] {
     of(experiment, method).map_or([f64::NAN; 2], |m| m.fit)
 }
 
@@ -75,7 +75,7 @@ pub(super) fn beta(experiment: &StudyExperiment, [measured, predicted]: &[Mat<f6
     let panel = |i: usize| {
         let curves = vec![
             measured_curve(time(), column(measured, i, rows.clone())),
-            line(Method::Hansen, "", time(), column(predicted, i, rows.clone())),
+            line(StudyMethod::Hansen, "", time(), column(predicted, i, rows.clone())),
         ];
         time_panel(i, "beta", first_view(experiment), curves)
     };
@@ -101,8 +101,8 @@ pub(super) fn starts(experiment: &StudyExperiment) -> Figure {
     let span = ends.iter().fold([f64::INFINITY, 0.0], |[l, h], f| [f64::min(l, *f), f64::max(h, *f)]);
     let fit_panel = |i: usize| {
         let (x, y) = over(&|s| s.fit[i]);
-        let level = line(Method::Hansen, "", span.to_vec(), vec![fit_of(experiment, Method::Hansen)[i]; 2]);
-        let curves = vec![points(Method::Pem, "per start", x, y), level];
+        let level = line(StudyMethod::Hansen, "", span.to_vec(), vec![fit_of(experiment, StudyMethod::Hansen)[i]; 2]);
+        let curves = vec![points(StudyMethod::Pem, "per start", x, y), level];
         let (x, y, content) = (factor_axis(), fit_axis(AXES[i]), Content::Curves(curves));
         Panel { title: AXES[i].into(), x, y, content, ..Panel::default() }
     };
@@ -111,7 +111,7 @@ pub(super) fn starts(experiment: &StudyExperiment) -> Figure {
         title: "criterion where the search ended".into(),
         x: factor_axis(),
         y: logarithmic("over the lowest", ""),
-        content: Content::Curves(vec![points(Method::Pem, "per start", x, y)]),
+        content: Content::Curves(vec![points(StudyMethod::Pem, "per start", x, y)]),
         ..Panel::default()
     };
     Figure {
@@ -144,7 +144,7 @@ fn first_view(experiment: &StudyExperiment) -> [f64; 2] {
 
 /// The fits of a caption.
 fn fits(experiment: &StudyExperiment) -> String {
-    let fit = |m: &Method| {
+    let fit = |m: &StudyMethod| {
         let note = match of(experiment, *m).map(|model| &model.model) {
             Some(Err(_)) | None => " (no model)",
             Some(Ok(_)) => "",

@@ -2,20 +2,20 @@
 
 use super::figures::{axis, fit_axis, line, logarithmic, points, ranged};
 use super::words::AXES;
-use crate::study::{Method, Paper, Row, Status, deciles, quantile};
+use crate::study::{Paper, RowStatus, StudyMethod, StudyRow, deciles, quantile};
 use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel, Sample};
 
 /// Command weight and both peaks over theta.
 pub(super) fn controllers(paper: &Paper) -> Figure {
-    let rows: Vec<&Row> = of(paper, Method::Nominal);
+    let rows: Vec<&StudyRow> = of(paper, StudyMethod::Nominal);
     let theta = || rows.iter().map(|r| r.theta).collect::<Vec<_>>();
-    let cloud = |value: &dyn Fn(&Row) -> f64| {
-        let found = |r: &&Row| if r.status == Status::NoController { f64::NAN } else { value(r) };
-        points(Method::Nominal, "", theta(), rows.iter().map(found).collect())
+    let cloud = |value: &dyn Fn(&StudyRow) -> f64| {
+        let found = |r: &&StudyRow| if r.status == RowStatus::NoController { f64::NAN } else { value(r) };
+        points(StudyMethod::Nominal, "", theta(), rows.iter().map(found).collect())
     };
     let limit = paper.settings.controller.peak_sensitivity;
-    let bound = || line(Method::Nominal, "limit", paper.settings.study.theta.to_vec(), vec![limit; 2]);
-    let peak = |title: &str, value: &dyn Fn(&Row) -> f64| {
+    let bound = || line(StudyMethod::Nominal, "limit", paper.settings.study.theta.to_vec(), vec![limit; 2]);
+    let peak = |title: &str, value: &dyn Fn(&StudyRow) -> f64| {
         panel(paper, title, ranged("peak", "", [1.0, limit + 0.2]), vec![cloud(value), bound()])
     };
     Figure {
@@ -38,7 +38,7 @@ pub(super) fn controllers(paper: &Paper) -> Figure {
 /// Fit over theta for PEM and Hansen.
 pub(super) fn figure_4(paper: &Paper) -> Figure {
     let panels = AXES.iter().enumerate().map(|(i, name)| {
-        let curves = [Method::Pem, Method::Hansen, Method::HansenPem, Method::Auto]
+        let curves = [StudyMethod::Pem, StudyMethod::Hansen, StudyMethod::HansenPem, StudyMethod::Auto]
             .into_iter()
             .flat_map(|m| [cloud(paper, m, i), medians(paper, m, i)]);
         panel(paper, name, fit_axis(name), curves.filter(|c| !c.x.is_empty()).collect())
@@ -58,12 +58,12 @@ pub(super) fn figure_4(paper: &Paper) -> Figure {
 
 /// Boxes of the fit, direct identification against Hansen.
 pub(super) fn figure_5(paper: &Paper) -> Figure {
-    let values = |m: Method, i: usize| of(paper, m).iter().map(|r| r.fit[i]).collect::<Vec<_>>();
-    let compared = [Method::Direct, Method::Hansen, Method::HansenPem, Method::Auto];
+    let values = |m: StudyMethod, i: usize| of(paper, m).iter().map(|r| r.fit[i]).collect::<Vec<_>>();
+    let compared = [StudyMethod::Direct, StudyMethod::Hansen, StudyMethod::HansenPem, StudyMethod::Auto];
     let lowest = compared.iter().flat_map(|m| [0, 1].map(|i| whisker(&values(*m, i)))).fold(90.0, f64::min);
     let view = [((lowest / 10.0).floor() * 10.0).clamp(-20.0, 90.0), 100.0];
     let panels = AXES.iter().enumerate().map(|(i, name)| {
-        let sample = |m: Method| Sample { method: m.key().into(), note: String::new(), values: values(m, i) };
+        let sample = |m: StudyMethod| Sample { method: m.key().into(), note: String::new(), values: values(m, i) };
         let samples = compared.into_iter().map(sample).filter(|s| !s.values.is_empty()).collect();
         Panel {
             title: (*name).into(),
@@ -86,19 +86,19 @@ pub(super) fn figure_5(paper: &Paper) -> Figure {
 }
 
 /// The rows of a method by rising theta.
-fn of(paper: &Paper, method: Method) -> Vec<&Row> {
-    let mut rows: Vec<&Row> = paper.study.iter().filter(|r| r.method == method).collect();
+fn of(paper: &Paper, method: StudyMethod) -> Vec<&StudyRow> {
+    let mut rows: Vec<&StudyRow> = paper.study.iter().filter(|r| r.method == method).collect();
     rows.sort_by(|a, b| a.theta.total_cmp(&b.theta));
     rows
 }
 
-fn cloud(paper: &Paper, method: Method, i: usize) -> Curve {
+fn cloud(paper: &Paper, method: StudyMethod, i: usize) -> Curve {
     let rows = of(paper, method);
     points(method, "", rows.iter().map(|r| r.theta).collect(), rows.iter().map(|r| r.fit[i]).collect())
 }
 
 /// At the middle of each tenth that has loops; a gap where half of them or more gave no model.
-fn medians(paper: &Paper, method: Method, i: usize) -> Curve {
+fn medians(paper: &Paper, method: StudyMethod, i: usize) -> Curve {
     let tenths = deciles(&paper.study, method, paper.settings.study.theta);
     let filled = || tenths.iter().filter(|d| d.count > 0);
     let finite = |v: f64| if v.is_finite() { v } else { f64::NAN };

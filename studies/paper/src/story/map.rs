@@ -2,9 +2,9 @@
 
 use super::figures::axis;
 use super::words::{NONE, and, count, percent, range, sentence, short};
-use crate::study::{Method, POOR_FIT, Paper, Row, TIE, Winner, crossover, winner};
+use crate::study::{POOR_FIT, Paper, StudyMethod, StudyRow, TIE, Winner, crossover, winner};
 use youla_report::figure::{Cell, Cells, Content, Figure, Layout, Panel};
-use youla_report::story::{Row as TableRow, Table};
+use youla_report::story::{Table, TableRow};
 
 /// Lead at which the colour is full, percentage points.
 const FULL: f64 = 20.0;
@@ -21,14 +21,14 @@ pub(super) struct MapCell {
 
 impl MapCell {
     /// The method that leads by more than a tie.
-    pub(super) fn won_by(&self) -> Option<Method> {
+    pub(super) fn won_by(&self) -> Option<StudyMethod> {
         self.winner.as_ref().filter(|w| w.margin >= TIE).map(|w| w.ranking[0].0)
     }
 
     /// Lead of one method over another in the median fit of the worse axis, percentage points.
-    pub(super) fn lead(&self, of: Method, over: Method) -> Option<f64> {
+    pub(super) fn lead(&self, of: StudyMethod, over: StudyMethod) -> Option<f64> {
         let ranking = &self.winner.as_ref()?.ranking;
-        let fit = |m: Method| ranking.iter().find(|(method, _)| *method == m).map(|(_, fit)| *fit);
+        let fit = |m: StudyMethod| ranking.iter().find(|(method, _)| *method == m).map(|(_, fit)| *fit);
         Some(fit(of)? - fit(over)?)
     }
 }
@@ -39,11 +39,11 @@ pub(super) fn cells(paper: &Paper) -> Vec<MapCell> {
 }
 
 /// The cells with some of the methods only.
-fn cells_among(paper: &Paper, competes: impl Fn(Method) -> bool) -> Vec<MapCell> {
+fn cells_among(paper: &Paper, competes: impl Fn(StudyMethod) -> bool) -> Vec<MapCell> {
     let grid = &paper.settings.crossover;
     let rows_of = |[w, n, t]: [usize; 3]| {
         let item = ((w * grid.noise.len() + n) * grid.theta.len() + t) * grid.repetitions;
-        let inside = |r: &&Row| (item..item + grid.repetitions).contains(&r.item) && competes(r.method);
+        let inside = |r: &&StudyRow| (item..item + grid.repetitions).contains(&r.item) && competes(r.method);
         (crossover(&paper.settings, item), paper.crossover.iter().filter(inside).collect::<Vec<_>>())
     };
     let mut cells = Vec::new();
@@ -84,7 +84,7 @@ pub(super) fn figure(paper: &Paper) -> Figure {
 
 /// Hansen against direct identification, as in Fig. 5: neither knows the structure of the plant.
 pub(super) fn figure_of_subspace(paper: &Paper) -> Figure {
-    let cells = cells_among(paper, |m| matches!(m, Method::Direct | Method::Hansen));
+    let cells = cells_among(paper, |m| matches!(m, StudyMethod::Direct | StudyMethod::Hansen));
     let caption = "The same between the two methods that know nothing of the structure of the plant.".into();
     drawn(paper, &cells, "crossover-map-subspace", "Crossover map, Hansen against direct identification", caption)
 }
@@ -118,7 +118,7 @@ fn cell(cell: &MapCell) -> Cell {
     let Some(winner) = &cell.winner else {
         return Cell { text: "no loop".into(), detail: "No controller keeps the margin.".into(), ..Cell::default() };
     };
-    let named = |(m, fit): &(Method, f64)| format!("{} {}", m.label(), percent(*fit, 1));
+    let named = |(m, fit): &(StudyMethod, f64)| format!("{} {}", m.label(), percent(*fit, 1));
     let detail = format!("{} %", winner.ranking.iter().map(named).collect::<Vec<_>>().join(", "));
     match cell.won_by() {
         None => Cell { text: "tie".into(), detail, ..Cell::default() },
@@ -154,8 +154,8 @@ fn sentence_of(feedback: &str, cells: &[&MapCell]) -> String {
     if with_loop.is_empty() {
         return format!("{head}no controller keeps the margin in any cell.");
     }
-    let wins = |m: Method| cells.iter().copied().filter(|c| c.won_by() == Some(m)).collect::<Vec<_>>();
-    let won = Method::ALL.into_iter().filter(|m| !wins(*m).is_empty()).map(|m| {
+    let wins = |m: StudyMethod| cells.iter().copied().filter(|c| c.won_by() == Some(m)).collect::<Vec<_>>();
+    let won = StudyMethod::ALL.into_iter().filter(|m| !wins(*m).is_empty()).map(|m| {
         let cells = wins(m);
         let (noise, theta) = (span(&cells, 1), span(&cells, 2));
         format!("{} wins {} (noise {noise} um, theta {theta})", m.label(), count(cells.len(), "cell", "cells"))
@@ -203,7 +203,7 @@ pub(super) fn table(paper: &Paper) -> Table {
 /// Of the cells of one column.
 fn ahead(column: &[&MapCell]) -> String {
     let leads: Vec<(f64, f64)> =
-        column.iter().filter_map(|c| Some((c.at[1], c.lead(Method::Hansen, Method::Direct)?))).collect();
+        column.iter().filter_map(|c| Some((c.at[1], c.lead(StudyMethod::Hansen, StudyMethod::Direct)?))).collect();
     let noise: Vec<String> = leads.iter().filter(|(_, lead)| *lead >= TIE).map(|(noise, _)| short(*noise, 4)).collect();
     match (leads.is_empty(), noise.is_empty()) {
         (true, _) => "no loop".into(),

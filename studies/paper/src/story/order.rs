@@ -3,12 +3,13 @@
 use super::figures_experiments::fit_of;
 use super::words::{AXES, and, percent};
 use crate::Result;
-use crate::study::{Method, StudyExperiment, TIE};
+use crate::study::{StudyExperiment, StudyMethod, TIE};
 use youla::validate::{fit, predict_open_loop};
 use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
 
 /// The rows of the paper's table.
-const ROWS: [Method; 4] = [Method::Nominal, Method::Pem, Method::Hansen, Method::HansenReduced];
+const ROWS: [StudyMethod; 4] =
+    [StudyMethod::Nominal, StudyMethod::Pem, StudyMethod::Hansen, StudyMethod::HansenReduced];
 
 /// The pairs that are compared, by their rows.
 const PAIRS: [[usize; 2]; 4] = [[0, 1], [0, 2], [1, 2], [2, 3]];

@@ -6,7 +6,7 @@ use super::map;
 use super::tables_experiments::TABLE_1;
 use super::tables_study::compared;
 use crate::Result;
-use crate::study::{Decile, Method, Paper, StudyExperiment, deciles, overall};
+use crate::study::{Decile, Paper, StudyExperiment, StudyMethod, deciles, overall};
 use serde_json::{Map, Value, json};
 use youla_greybox::Structure;
 use youla_twin::BearingStructure;
@@ -48,7 +48,7 @@ pub fn paper_summary(paper: &Paper) -> Result<Value> {
     }))
 }
 
-fn study_entry(paper: &Paper, method: Method) -> Value {
+fn study_entry(paper: &Paper, method: StudyMethod) -> Value {
     let theta = paper.settings.study.theta;
     let entry = |d: &Decile| {
         json!({
@@ -66,7 +66,7 @@ fn map_entries(paper: &Paper) -> Vec<Value> {
             cell.winner.iter().flat_map(|w| &w.ranking).map(|(m, fit)| json!({"method": m.key(), "fit": fit}));
         json!({
             "command_weight": cell.at[0], "noise_um": cell.at[1], "theta": cell.at[2],
-            "winner": cell.won_by().map(Method::key),
+            "winner": cell.won_by().map(StudyMethod::key),
             "lead": cell.winner.as_ref().map(|w| w.margin),
             "ranking": ranking.collect::<Vec<_>>(),
         })
@@ -81,7 +81,7 @@ fn nominal_entry(paper: &Paper) -> Value {
 }
 
 fn experiment_entry(e: &StudyExperiment) -> Value {
-    let model = |(method, published): (Method, Option<usize>)| {
+    let model = |(method, published): (StudyMethod, Option<usize>)| {
         let mut entry = json!({"fit": fit_of(e, method), "paper": published.map(|k| e.case.published[k])});
         if let Some(found) = e.models.iter().find(|m| m.method == method) {
             match &found.model {

@@ -1,18 +1,18 @@
 //! Parts that the tables share.
 
 use super::words::{AXES, percent};
-use crate::study::{ExperimentModel, Method};
-use youla_report::story::Row;
+use crate::study::{ExperimentModel, StudyMethod};
+use youla_report::story::TableRow;
 pub(super) use youla_report::story::plain;
 
 /// A row that is about no method.
-pub(super) fn row(cells: impl IntoIterator<Item = String>) -> Row {
-    Row { method: String::new(), cells: cells.into_iter().collect() }
+pub(super) fn row(cells: impl IntoIterator<Item = String>) -> TableRow {
+    TableRow { method: String::new(), cells: cells.into_iter().collect() }
 }
 
 /// A row about a method.
-pub(super) fn method_row(method: Method, cells: impl IntoIterator<Item = String>) -> Row {
-    Row { method: method.key().into(), cells: cells.into_iter().collect() }
+pub(super) fn method_row(method: StudyMethod, cells: impl IntoIterator<Item = String>) -> TableRow {
+    TableRow { method: method.key().into(), cells: cells.into_iter().collect() }
 }
 
 /// One cell per axis.

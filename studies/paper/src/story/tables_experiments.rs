@@ -5,18 +5,18 @@ use super::modes::{oscillations, real_poles};
 use super::order::rig_fit;
 use super::tables::{axes, fit_cells, method_row, order, plain, row, yes};
 use crate::Result;
-use crate::study::{Method, Paper};
-use youla_report::story::{Row, Table};
+use crate::study::{Paper, StudyMethod};
+use youla_report::story::{Table, TableRow};
 use youla_twin::rig::BearingRig;
 
 /// The methods of Table 1, each with its row of the paper's table.
-pub(super) const TABLE_1: [(Method, Option<usize>); 6] = [
-    (Method::Nominal, Some(0)),
-    (Method::Pem, Some(1)),
-    (Method::PemMultiStart, None),
-    (Method::Hansen, Some(2)),
-    (Method::HansenReduced, Some(3)),
-    (Method::HansenPem, None),
+pub(super) const TABLE_1: [(StudyMethod, Option<usize>); 6] = [
+    (StudyMethod::Nominal, Some(0)),
+    (StudyMethod::Pem, Some(1)),
+    (StudyMethod::PemMultiStart, None),
+    (StudyMethod::Hansen, Some(2)),
+    (StudyMethod::HansenReduced, Some(3)),
+    (StudyMethod::HansenPem, None),
 ];
 
 /// Table 1, the paper's numbers beneath ours.
@@ -46,7 +46,7 @@ pub(super) fn table_1(paper: &Paper) -> Result<Table> {
 /// Orders, fits and stability before and after reduction.
 pub(super) fn reduction(paper: &Paper) -> Table {
     let rows = paper.experiments.list.iter().flat_map(|e| {
-        [Method::Hansen, Method::HansenReduced].into_iter().filter_map(|m| {
+        [StudyMethod::Hansen, StudyMethod::HansenReduced].into_iter().filter_map(|m| {
             let model = of(e, m)?;
             let head = [e.case.title.clone(), m.label().to_owned(), order(model)];
             let fit = fit_cells(model.fit, 2);
@@ -65,7 +65,7 @@ pub(super) fn reduction(paper: &Paper) -> Table {
 
 /// Modes of the models that have the order of the nominal one beside those of the rig.
 pub(super) fn modes(paper: &Paper) -> Result<Table> {
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<TableRow> = Vec::new();
     for e in &paper.experiments.list {
         let rig = BearingRig::new(&paper.rig, e.case.fidelity, 0)?.true_plant()?.modes()?;
         let nyquist = 0.5 / e.verification.time.ts();
@@ -76,7 +76,7 @@ pub(super) fn modes(paper: &Paper) -> Result<Table> {
             oscillations(&rig, nyquist),
             real_poles(&rig, nyquist),
         ]));
-        for m in [Method::Nominal, Method::Pem, Method::HansenReduced] {
+        for m in [StudyMethod::Nominal, StudyMethod::Pem, StudyMethod::HansenReduced] {
             if let Some(model) = of(e, m).filter(|model| model.model.is_ok()) {
                 let cells = [
                     title(),

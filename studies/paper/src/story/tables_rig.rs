@@ -6,7 +6,7 @@ use crate::study::ExcitedChannel;
 use crate::study::{Paper, StudyExperiment};
 use serde::Deserialize;
 use std::f64::consts::TAU;
-use youla_report::story::{Row, Table};
+use youla_report::story::{Table, TableRow};
 use youla_twin::rig::{ExperimentRecord, Fidelity};
 
 /// Every parameter with unit and basis, in the order of the file.
@@ -30,7 +30,7 @@ struct Written {
 }
 
 /// `bearing.damping]`, then its value, unit and basis; nothing for a table of tables.
-fn parameter(table: &str) -> Option<Row> {
+fn parameter(table: &str) -> Option<TableRow> {
     let (name, body) = table.trim_start_matches('[').split_once(']')?;
     let written: Written = toml::from_str(body).ok()?;
     Some(row([name.to_owned(), value(&written.value), written.unit, written.basis]))
@@ -101,7 +101,7 @@ pub(super) fn outcomes(paper: &Paper) -> Table {
     )
 }
 
-fn outcome(name: &str, record: &ExperimentRecord, settle: usize) -> Row {
+fn outcome(name: &str, record: &ExperimentRecord, settle: usize) -> TableRow {
     let sample = |k: Option<usize>| k.map_or_else(|| "no".to_owned(), |k| format!("at sample {k}"));
     let pair = |[h, v]: [usize; 2]| format!("{h} / {v}");
     row([

@@ -2,19 +2,20 @@
 
 use super::tables::{axes, fit_cells, method_row, plain, row};
 use super::words::range;
-use crate::study::{Decile, Method, POOR_FIT, Paper, deciles, overall};
+use crate::study::{Decile, POOR_FIT, Paper, StudyMethod, deciles, overall};
 use youla_report::story::Table;
 
 /// The methods of the study that have rows, the nominal model first.
-pub(super) fn compared(paper: &Paper) -> Vec<Method> {
-    Method::ALL.into_iter().filter(|m| paper.study.iter().any(|r| r.method == *m)).collect()
+pub(super) fn compared(paper: &Paper) -> Vec<StudyMethod> {
+    StudyMethod::ALL.into_iter().filter(|m| paper.study.iter().any(|r| r.method == *m)).collect()
 }
 
 /// The tenths of theta of each method, then all of it.
-fn lines(paper: &Paper, methods: &[Method]) -> Vec<Vec<Decile>> {
+fn lines(paper: &Paper, methods: &[StudyMethod]) -> Vec<Vec<Decile>> {
     let theta = paper.settings.study.theta;
-    let of =
-        |m: &Method| deciles(&paper.study, *m, theta).into_iter().chain([overall(&paper.study, *m, theta)]).collect();
+    let of = |m: &StudyMethod| {
+        deciles(&paper.study, *m, theta).into_iter().chain([overall(&paper.study, *m, theta)]).collect()
+    };
     let columns: Vec<Vec<Decile>> = methods.iter().map(of).collect();
     (0..11).map(|k| columns.iter().map(|c| c[k].clone()).collect()).collect()
 }
@@ -44,7 +45,7 @@ pub(super) fn medians(paper: &Paper) -> Table {
 
 /// What became of every loop; each line adds up to its loops.
 pub(super) fn failures(paper: &Paper) -> Table {
-    let methods: Vec<Method> = compared(paper).into_iter().filter(|m| *m != Method::Nominal).collect();
+    let methods: Vec<StudyMethod> = compared(paper).into_iter().filter(|m| *m != StudyMethod::Nominal).collect();
     let lines = lines(paper, &methods);
     let counts = |d: &Decile| [d.usable(), d.refused, d.unstable, d.poor_fit].map(|n| n.to_string());
     let rows = lines
@@ -64,13 +65,13 @@ pub(super) fn failures(paper: &Paper) -> Table {
     }
 }
 
-fn grouped(methods: &[Method], width: usize) -> Vec<(String, usize)> {
+fn grouped(methods: &[StudyMethod], width: usize) -> Vec<(String, usize)> {
     std::iter::once((String::new(), 2)).chain(methods.iter().map(|m| (m.label().to_owned(), width))).collect()
 }
 
 /// Sums over the whole study, one line per method.
 pub(super) fn sums(paper: &Paper) -> Table {
-    let rows = compared(paper).into_iter().filter(|m| *m != Method::Nominal).map(|m| {
+    let rows = compared(paper).into_iter().filter(|m| *m != StudyMethod::Nominal).map(|m| {
         let all = overall(&paper.study, m, paper.settings.study.theta);
         let sum = all.usable() + all.refused + all.unstable + all.poor_fit;
         let counts = [all.usable(), all.refused, all.unstable, all.poor_fit, sum].map(|n| n.to_string());

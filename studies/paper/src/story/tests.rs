@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::study::{
-    Experiments, Method, Paper, PaperSettings, PaperTiming, Row, Status, crossover, crossover_items, experiments,
+    Experiments, Paper, PaperSettings, PaperTiming, RowStatus, StudyMethod, StudyRow, crossover, crossover_items,
+    experiments,
 };
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -25,8 +26,8 @@ fn shared_experiments() -> Experiments {
     FOUND.get_or_init(|| experiments(&RigParameters::shipped(), &settings()).unwrap()).clone()
 }
 
-fn row(item: usize, theta: f64, method: Method, fit: Option<f64>) -> Row {
-    Row {
+fn row(item: usize, theta: f64, method: StudyMethod, fit: Option<f64>) -> StudyRow {
+    StudyRow {
         item,
         theta,
         noise: 0.2,
@@ -34,7 +35,7 @@ fn row(item: usize, theta: f64, method: Method, fit: Option<f64>) -> Row {
         peak_nominal: 1.5,
         peak_plant: 2.0,
         method,
-        status: if fit.is_some() { Status::Stable } else { Status::Refused },
+        status: if fit.is_some() { RowStatus::Stable } else { RowStatus::Refused },
         fit: fit.map_or([f64::NAN; 2], |f| [f, f - 1.0]),
         steps: None,
         note: String::new(),
@@ -42,38 +43,38 @@ fn row(item: usize, theta: f64, method: Method, fit: Option<f64>) -> Row {
 }
 
 /// Rows of the study from the fit of each method at theta; `None` is no model.
-fn study(fit: impl Fn(Method, f64) -> Option<f64>) -> Vec<Row> {
-    let methods = [Method::Nominal, Method::Pem, Method::Direct, Method::Hansen];
+fn study(fit: impl Fn(StudyMethod, f64) -> Option<f64>) -> Vec<StudyRow> {
+    let methods = [StudyMethod::Nominal, StudyMethod::Pem, StudyMethod::Direct, StudyMethod::Hansen];
     let one = |k: usize| (k, (k as f64 + 0.5) / MODELS as f64);
     (0..MODELS).map(one).flat_map(|(k, theta)| methods.map(|m| row(k, theta, m, fit(m, theta)))).collect()
 }
 
 /// PEM fails from theta = 0.6 on, Hansen once, direct identification is best.
-fn as_found(method: Method, theta: f64) -> Option<f64> {
+fn as_found(method: StudyMethod, theta: f64) -> Option<f64> {
     match method {
-        Method::Nominal => Some(100.0 - 300.0 * theta),
-        Method::Pem => Some(if theta < 0.6 { 98.0 } else { -20.0 }),
-        Method::Direct => Some(97.0 + theta),
+        StudyMethod::Nominal => Some(100.0 - 300.0 * theta),
+        StudyMethod::Pem => Some(if theta < 0.6 { 98.0 } else { -20.0 }),
+        StudyMethod::Direct => Some(97.0 + theta),
         _ => (!(0.25..0.275).contains(&theta)).then_some(95.0),
     }
 }
 
 /// Hansen overtakes direct identification from a noise of 0.5 um on; with strong feedback there is no loop above theta = 0.1.
-fn map_rows(settings: &PaperSettings) -> Vec<Row> {
+fn map_rows(settings: &PaperSettings) -> Vec<StudyRow> {
     let loops = (0..crossover_items(settings)).map(|k| crossover(settings, k));
     loops
         .flat_map(|item| {
             let none = item.command_weights[0] < 2.0 && item.theta > 0.2;
             let lead = if item.noise >= 0.5 { 8.0 } else { 0.5 };
-            [(Method::Direct, 80.0), (Method::Hansen, 80.0 + lead)].map(|(method, fit)| {
-                let status = if none { Status::NoController } else { Status::Stable };
-                Row { status, ..row(item.index, item.theta, method, (!none).then_some(fit)) }
+            [(StudyMethod::Direct, 80.0), (StudyMethod::Hansen, 80.0 + lead)].map(|(method, fit)| {
+                let status = if none { RowStatus::NoController } else { RowStatus::Stable };
+                StudyRow { status, ..row(item.index, item.theta, method, (!none).then_some(fit)) }
             })
         })
         .collect()
 }
 
-fn paper(study: Vec<Row>) -> Paper {
+fn paper(study: Vec<StudyRow>) -> Paper {
     let settings = settings();
     Paper {
         crossover: map_rows(&settings),
@@ -210,8 +211,8 @@ fn verdicts_follow_the_rows() {
     );
 
     let robust = paper(study(|method, theta| match method {
-        Method::Pem => Some(98.0),
-        Method::Direct => Some(60.0 + 30.0 * theta),
+        StudyMethod::Pem => Some(98.0),
+        StudyMethod::Direct => Some(60.0 + 30.0 * theta),
         _ => Some(95.0),
     }));
     assert_eq!(outcome(&robust, "figure-4-large"), ClaimOutcome::Fails);
@@ -219,13 +220,13 @@ fn verdicts_follow_the_rows() {
     assert_eq!(outcome(&robust, "figure-5-variance"), ClaimOutcome::Holds);
     assert_eq!(outcome(&robust, "s-stable"), ClaimOutcome::Holds);
 
-    let apart = paper(study(|method, _| Some(if method == Method::Pem { 98.0 } else { 80.0 })));
+    let apart = paper(study(|method, _| Some(if method == StudyMethod::Pem { 98.0 } else { 80.0 })));
     assert_eq!(outcome(&apart, "figure-4-small"), ClaimOutcome::Fails);
 }
 
 #[test]
 fn a_study_without_a_method_says_so() {
-    let lonely = paper(study(as_found).into_iter().filter(|r| r.method == Method::Pem).collect());
+    let lonely = paper(study(as_found).into_iter().filter(|r| r.method == StudyMethod::Pem).collect());
     assert_eq!(outcome(&lonely, "figure-4-large"), ClaimOutcome::Unknown);
     assert_eq!(outcome(&lonely, "figure-5-mean"), ClaimOutcome::Unknown);
     assert!(paper_story(&lonely).is_ok());

@@ -2,7 +2,7 @@
 //! continued.
 
 use super::item::Evaluated;
-use super::row::Row;
+use super::row::StudyRow;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -98,8 +98,8 @@ impl FromStr for Shard {
 
 /// Items whose rows go to one file.
 #[derive(Debug, Clone)]
-pub struct Campaign {
-    /// The results file: [`Row::HEADER`], then the rows of item after item.
+pub struct StudyCampaign {
+    /// The results file: [`StudyRow::HEADER`], then the rows of item after item.
     pub path: PathBuf,
     /// The items.
     pub items: Range<usize>,
@@ -109,16 +109,16 @@ pub struct Campaign {
 
 /// What a campaign found.
 #[derive(Debug, Clone)]
-pub struct Outcome {
+pub struct CampaignOutcome {
     /// All rows, those of an earlier call included.
-    pub rows: Vec<Row>,
+    pub rows: Vec<StudyRow>,
     /// Items that were computed in this call, without those that had no loop.
     pub computed: usize,
     /// Time per part of an item, summed over the items of this call; see [`Evaluated::durations`].
     pub durations: Vec<Duration>,
 }
 
-impl Campaign {
+impl StudyCampaign {
     /// Computes the items that the file lacks, on all threads of rayon's pool, and adds their rows to it.
     ///
     /// The file is a prefix of the result at any time: an item is written as soon as all items before it are. Its contents do
@@ -134,7 +134,7 @@ impl Campaign {
         evaluate: impl Fn(usize) -> Result<Evaluated> + Sync,
         continued: &dyn Fn(usize, usize),
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Outcome> {
+    ) -> Result<CampaignOutcome> {
         let io = |source| Error::File(youla_io::Error::Io { path: self.path.clone(), source });
         let mut file = OpenOptions::new().create(true).read(true).append(true).open(&self.path).map_err(io)?;
         match file.try_lock() {
@@ -145,13 +145,13 @@ impl Campaign {
         let found = Found::read(&self.path, self.items.clone(), self.rows_per_item)?;
         file.set_len(found.bytes as u64).map_err(io)?;
         if found.bytes == 0 {
-            writeln!(file, "{}", Row::HEADER).map_err(io)?;
+            writeln!(file, "{}", StudyRow::HEADER).map_err(io)?;
         }
         let done = found.rows.len() / self.rows_per_item;
         continued(done, found.damaged);
         progress(done);
         let start = self.items.start + done;
-        let outcome = Outcome { rows: found.rows, computed: 0, durations: Vec::new() };
+        let outcome = CampaignOutcome { rows: found.rows, computed: 0, durations: Vec::new() };
         let writer = Mutex::new(Writer { file, next: start, waiting: BTreeMap::new(), outcome, failure: None });
         let (next, stop) = (AtomicUsize::new(start), AtomicBool::new(false));
         rayon::broadcast(|_| {
@@ -178,7 +178,7 @@ struct Writer {
     /// The item that is written next.
     next: usize,
     waiting: BTreeMap<usize, Result<Evaluated>>,
-    outcome: Outcome,
+    outcome: CampaignOutcome,
     failure: Option<Error>,
 }
 
@@ -214,13 +214,13 @@ impl Writer {
 ///
 /// # Errors
 /// [`Error::NotResults`], [`youla_io::Error::Io`].
-pub fn read_results(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Vec<Row>> {
+pub fn read_results(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Vec<StudyRow>> {
     Ok(Found::read(path, items, rows_per_item)?.rows)
 }
 
 /// The usable beginning of a results file.
 struct Found {
-    rows: Vec<Row>,
+    rows: Vec<StudyRow>,
     /// Its length.
     bytes: usize,
     /// Lines behind it.
@@ -233,7 +233,7 @@ impl Found {
         let text = youla_io::read_bytes(path)?;
         let mut lines = text.split_inclusive(|byte| *byte == b'\n');
         let header = lines.next().unwrap_or_default();
-        let expected = format!("{}\n", Row::HEADER);
+        let expected = format!("{}\n", StudyRow::HEADER);
         if header != expected.as_bytes() {
             // A header that was cut off belongs to a process that was killed at once.
             return match expected.as_bytes().starts_with(header) {
@@ -244,7 +244,7 @@ impl Found {
         let (mut rows, mut bytes, mut length) = (Vec::new(), header.len(), header.len());
         for line in lines {
             let item = items.start + rows.len() / rows_per_item;
-            match complete(line).filter(|row: &Row| row.item == item && item < items.end) {
+            match complete(line).filter(|row: &StudyRow| row.item == item && item < items.end) {
                 Some(row) => rows.push(row),
                 None => break,
             }
@@ -259,6 +259,6 @@ impl Found {
     }
 }
 
-fn complete(line: &[u8]) -> Option<Row> {
-    Row::parse(std::str::from_utf8(line).ok()?.strip_suffix('\n')?)
+fn complete(line: &[u8]) -> Option<StudyRow> {
+    StudyRow::parse(std::str::from_utf8(line).ok()?.strip_suffix('\n')?)
 }

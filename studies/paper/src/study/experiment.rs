@@ -2,7 +2,7 @@
 
 use super::controller::{Design, design_with};
 use super::item::{excitation, generator, lower, text};
-use super::method::Method;
+use super::method::StudyMethod;
 use super::settings::PaperSettings;
 use crate::study::{ExcitationReport, ExcitationReportOptions, describe_excitation};
 use crate::{Error, Result};
@@ -71,7 +71,7 @@ pub struct StudyExperiment {
 #[derive(Debug, Clone)]
 pub struct ExperimentModel {
     /// The method.
-    pub method: Method,
+    pub method: StudyMethod,
     /// The model, or why there is none.
     pub model: Result<StateSpace<Discrete>, String>,
     /// Fit (26) on the verification record, percent; NaN without a model.
@@ -131,7 +131,7 @@ pub(super) fn run(
 ) -> Result<StudyExperiment> {
     let start = nominal.degraded(case.a_factor, case.b_factor)?;
     let rig = BearingRig::new(parameters, case.fidelity, 0)?;
-    let time = youla_twin::rig::Rig::time(&rig);
+    let time = youla_twin::rig::SimulatedRig::time(&rig);
     let model = start.plant()?.zoh(time)?;
     let weight = settings.experiments.command_weight;
     let design = design_with(&model, &rig.true_plant()?, weight, &settings.controller)?;
@@ -152,12 +152,12 @@ pub(super) fn run(
     let projected = timed(|| data.hansen_pem(hansen.0.as_ref().map_err(String::clone)?.clone(), &single.0));
     let best = starts.iter().min_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
     let models = vec![
-        data.judge(Method::Nominal, Ok(design.factors.nominal().clone()), 0.0)?,
-        data.judge(Method::Pem, single.0.map(|found| found.model), single.1)?,
-        data.judge(Method::PemMultiStart, best.map(pem).ok_or_else(|| "no start led to a model".into()), 0.0)?,
-        data.judge(Method::Hansen, hansen.0.as_ref().map(|h| h.plant.clone()).map_err(String::clone), hansen.1)?,
-        data.judge(Method::HansenReduced, reduced.0.map(|r| r.model), reduced.1)?,
-        data.judge(Method::HansenPem, projected.0.map(|found| found.model), single.1 + hansen.1 + projected.1)?,
+        data.judge(StudyMethod::Nominal, Ok(design.factors.nominal().clone()), 0.0)?,
+        data.judge(StudyMethod::Pem, single.0.map(|found| found.model), single.1)?,
+        data.judge(StudyMethod::PemMultiStart, best.map(pem).ok_or_else(|| "no start led to a model".into()), 0.0)?,
+        data.judge(StudyMethod::Hansen, hansen.0.as_ref().map(|h| h.plant.clone()).map_err(String::clone), hansen.1)?,
+        data.judge(StudyMethod::HansenReduced, reduced.0.map(|r| r.model), reduced.1)?,
+        data.judge(StudyMethod::HansenPem, projected.0.map(|found| found.model), single.1 + hansen.1 + projected.1)?,
     ];
     let excitation = described(&estimation, settings)?;
     let reflected = hansen.0.as_ref().map_or(0, |found| found.deviation.stability.moved.len());
@@ -302,7 +302,7 @@ impl Data<'_> {
 
     fn judge(
         &self,
-        method: Method,
+        method: StudyMethod,
         model: Result<StateSpace<Discrete>, String>,
         seconds: f64,
     ) -> Result<ExperimentModel> {

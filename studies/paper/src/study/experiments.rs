@@ -9,7 +9,9 @@ use rayon::prelude::*;
 use youla::identify::subspace;
 use youla_greybox::{GreyBoxModel, Problem, greybox};
 use youla_twin::BearingStructure;
-use youla_twin::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, OpenLoop, Rig, RigParameters, run_experiment};
+use youla_twin::rig::{
+    Bearing, BearingRig, ExperimentRecord, Fidelity, OpenLoop, RigParameters, SimulatedRig, run_experiment,
+};
 
 /// First stream of the experiments; those of study and map lie elsewhere.
 const FIRST: u64 = 1 << 50;

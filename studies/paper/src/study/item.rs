@@ -1,8 +1,8 @@
 //! One nominal model: its controller, its loop, identification by every method, verification without noise.
 
 use super::controller::{Design, design};
-use super::method::Method;
-use super::row::{Row, Status};
+use super::method::StudyMethod;
+use super::row::{RowStatus, StudyRow};
 use super::settings::PaperSettings;
 use crate::Result;
 use rand::{RngExt, SeedableRng};
@@ -46,7 +46,7 @@ pub struct Item {
 #[derive(Debug, Clone)]
 pub struct Evaluated {
     /// The nominal model, then the methods in the order of the settings.
-    pub rows: Vec<Row>,
+    pub rows: Vec<StudyRow>,
     /// Design and simulation, then as `rows`.
     pub durations: Vec<Duration>,
 }
@@ -73,8 +73,9 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
     let start = truth.degraded(a_factor, 1.0)?;
     let (single, hansen) = (OnceCell::new(), OnceCell::new());
     let loop_data = LoopData { design: &design, estimation, verification, start, single, hansen };
-    let methods =
-        [Method::Nominal].into_iter().chain(settings.methods.iter().copied().filter(|m| *m != Method::Nominal));
+    let methods = [StudyMethod::Nominal]
+        .into_iter()
+        .chain(settings.methods.iter().copied().filter(|m| *m != StudyMethod::Nominal));
     let rows = methods
         .map(|method| {
             let row = loop_data.row(item, method, settings);
@@ -163,13 +164,13 @@ struct Found {
 }
 
 impl LoopData<'_> {
-    fn row(&self, item: &Item, method: Method, settings: &PaperSettings) -> Row {
+    fn row(&self, item: &Item, method: StudyMethod, settings: &PaperSettings) -> StudyRow {
         let judged = self.identify(method, settings).and_then(|found| self.judge(found).map_err(text));
         let (status, fit, steps, note) = match judged {
             Ok(outcome) => outcome,
-            Err(reason) => (Status::Refused, [f64::NAN; 2], None, reason),
+            Err(reason) => (RowStatus::Refused, [f64::NAN; 2], None, reason),
         };
-        Row {
+        StudyRow {
             item: item.index,
             theta: item.theta,
             noise: item.noise,
@@ -184,29 +185,29 @@ impl LoopData<'_> {
         }
     }
 
-    fn judge(&self, found: Found) -> Result<(Status, [f64; 2], Option<usize>, String)> {
-        let status = if found.model.is_stable()? { Status::Stable } else { Status::Unstable };
+    fn judge(&self, found: Found) -> Result<(RowStatus, [f64; 2], Option<usize>, String)> {
+        let status = if found.model.is_stable()? { RowStatus::Stable } else { RowStatus::Unstable };
         Ok((status, fit_on(&self.verification, &found.model)?, found.steps, found.note))
     }
 
-    fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found, String> {
+    fn identify(&self, method: StudyMethod, settings: &PaperSettings) -> Result<Found, String> {
         let black_box = |model| Found { model, steps: None, note: String::new() };
         let from_s = |model, hansen: &HansenModel| Found { model, steps: None, note: reflected(hansen) };
         match method {
-            Method::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
-            Method::Pem => self.single(settings).map(grey_box),
-            Method::PemMultiStart => self.best_pem(settings).map(|found| grey_box(&found)),
-            Method::Direct => direct(&self.experiment(), self.time(), &at_rest(&settings.direct))
+            StudyMethod::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
+            StudyMethod::Pem => self.single(settings).map(grey_box),
+            StudyMethod::PemMultiStart => self.best_pem(settings).map(|found| grey_box(&found)),
+            StudyMethod::Direct => direct(&self.experiment(), self.time(), &at_rest(&settings.direct))
                 .map(|found| black_box(found.model))
                 .map_err(text),
-            Method::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), found)),
-            Method::HansenReduced => {
+            StudyMethod::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), found)),
+            StudyMethod::HansenReduced => {
                 let found = self.hansen(settings)?;
                 let reduced = reduce(&found.plant, &settings.reduction).map_err(text)?;
                 Ok(from_s(reduced.model, found))
             }
-            Method::HansenPem => self.hansen_pem(settings),
-            Method::Auto => recommend(&self.experiment(), &[], None, self.time(), &LikelihoodOptions::default())
+            StudyMethod::HansenPem => self.hansen_pem(settings),
+            StudyMethod::Auto => recommend(&self.experiment(), &[], None, self.time(), &LikelihoodOptions::default())
                 .map(|found| black_box(found.plant))
                 .map_err(text),
         }

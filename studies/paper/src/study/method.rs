@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A model that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum StudyMethod {
     /// The nominal model G(0) itself.
     Nominal,
     /// Grey-box prediction error, started at the nominal model.
@@ -24,49 +24,49 @@ pub enum Method {
     Auto,
 }
 
-impl Method {
+impl StudyMethod {
     /// All methods in the order in which they are listed.
-    pub const ALL: [Method; 8] = [
-        Method::Nominal,
-        Method::Pem,
-        Method::PemMultiStart,
-        Method::Direct,
-        Method::Hansen,
-        Method::HansenReduced,
-        Method::HansenPem,
-        Method::Auto,
+    pub const ALL: [StudyMethod; 8] = [
+        StudyMethod::Nominal,
+        StudyMethod::Pem,
+        StudyMethod::PemMultiStart,
+        StudyMethod::Direct,
+        StudyMethod::Hansen,
+        StudyMethod::HansenReduced,
+        StudyMethod::HansenPem,
+        StudyMethod::Auto,
     ];
 
     /// Key in files.
     pub fn key(self) -> &'static str {
         match self {
-            Method::Nominal => "nominal",
-            Method::Pem => "pem",
-            Method::PemMultiStart => "pem_multi_start",
-            Method::Direct => "direct",
-            Method::Hansen => "hansen",
-            Method::HansenReduced => "hansen_reduced",
-            Method::HansenPem => "hansen_pem",
-            Method::Auto => "auto",
+            StudyMethod::Nominal => "nominal",
+            StudyMethod::Pem => "pem",
+            StudyMethod::PemMultiStart => "pem_multi_start",
+            StudyMethod::Direct => "direct",
+            StudyMethod::Hansen => "hansen",
+            StudyMethod::HansenReduced => "hansen_reduced",
+            StudyMethod::HansenPem => "hansen_pem",
+            StudyMethod::Auto => "auto",
         }
     }
 
     /// Name in tables and figures.
     pub fn label(self) -> &'static str {
         match self {
-            Method::Nominal => "nominal G(0)",
-            Method::Pem => "PEM",
-            Method::PemMultiStart => "PEM, several starts",
-            Method::Direct => "direct N4SID",
-            Method::Hansen => "Hansen G(S)",
-            Method::HansenReduced => "Hansen reduced G_red(S)",
-            Method::HansenPem => "PEM from Hansen",
-            Method::Auto => "youla auto",
+            StudyMethod::Nominal => "nominal G(0)",
+            StudyMethod::Pem => "PEM",
+            StudyMethod::PemMultiStart => "PEM, several starts",
+            StudyMethod::Direct => "direct N4SID",
+            StudyMethod::Hansen => "Hansen G(S)",
+            StudyMethod::HansenReduced => "Hansen reduced G_red(S)",
+            StudyMethod::HansenPem => "PEM from Hansen",
+            StudyMethod::Auto => "youla auto",
         }
     }
 
     /// The method with this key.
-    pub fn of_key(key: &str) -> Option<Method> {
-        Method::ALL.into_iter().find(|method| method.key() == key)
+    pub fn of_key(key: &str) -> Option<StudyMethod> {
+        StudyMethod::ALL.into_iter().find(|method| method.key() == key)
     }
 }

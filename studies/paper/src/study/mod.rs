@@ -27,7 +27,7 @@ mod row;
 mod settings;
 mod statistics;
 
-pub use campaign::{Campaign, Outcome, Shard, read_results};
+pub use campaign::{CampaignOutcome, Shard, StudyCampaign, read_results};
 pub use controller::{Design, design, design_with};
 pub use crossover::{count as crossover_items, crossover};
 pub use excitation_report::{
@@ -36,9 +36,9 @@ pub use excitation_report::{
 pub use experiment::{Case, ExperimentModel, Start, StudyExperiment};
 pub use experiments::{Experiments, OpenLoopFit, experiments};
 pub use item::{Evaluated, Item, evaluate};
-pub use method::Method;
+pub use method::StudyMethod;
 pub use monte_carlo::monte_carlo;
 pub use paper::{Paper, PaperTiming};
-pub use row::{Row, Status};
+pub use row::{RowStatus, StudyRow};
 pub use settings::{CrossoverSettings, ExperimentSettings, PaperSettings, StudyController, StudySettings};
 pub use statistics::{Decile, POOR_FIT, TIE, Winner, deciles, median, overall, quantile, winner};

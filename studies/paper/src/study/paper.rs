@@ -1,8 +1,8 @@
 //! Everything that was found.
 
 use super::experiments::Experiments;
-use super::method::Method;
-use super::row::Row;
+use super::method::StudyMethod;
+use super::row::StudyRow;
 use super::settings::PaperSettings;
 use serde::{Deserialize, Serialize};
 use youla_twin::rig::RigParameters;
@@ -15,9 +15,9 @@ pub struct Paper {
     /// The rig.
     pub rig: RigParameters,
     /// Rows of Figs 4 and 5.
-    pub study: Vec<Row>,
+    pub study: Vec<StudyRow>,
     /// Rows of the crossover map.
-    pub crossover: Vec<Row>,
+    pub crossover: Vec<StudyRow>,
     /// Table 1 and Figs 6 to 10.
     pub experiments: Experiments,
     /// What took how long.
@@ -37,5 +37,5 @@ pub struct PaperTiming {
     /// Mean processor milliseconds of a loop for design and simulation.
     pub loop_ms: f64,
     /// Mean processor milliseconds per method, identification and verification.
-    pub method_ms: Vec<(Method, f64)>,
+    pub method_ms: Vec<(StudyMethod, f64)>,
 }

@@ -1,11 +1,11 @@
 //! One line of a results file: one nominal model by one method, with a check of its own.
 
-use super::method::Method;
+use super::method::StudyMethod;
 use hmac_sha256::Hash;
 
 /// What became of an identification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
+pub enum RowStatus {
     /// A stable model.
     Stable,
     /// An unstable model.
@@ -16,27 +16,27 @@ pub enum Status {
     NoController,
 }
 
-impl Status {
-    const ALL: [(Status, &'static str); 4] = [
-        (Status::Stable, "stable"),
-        (Status::Unstable, "unstable"),
-        (Status::Refused, "refused"),
-        (Status::NoController, "no-controller"),
+impl RowStatus {
+    const ALL: [(RowStatus, &'static str); 4] = [
+        (RowStatus::Stable, "stable"),
+        (RowStatus::Unstable, "unstable"),
+        (RowStatus::Refused, "refused"),
+        (RowStatus::NoController, "no-controller"),
     ];
 
     /// The status with this word.
-    fn of_word(word: &str) -> Option<Status> {
-        Status::ALL.iter().find(|(_, known)| *known == word).map(|(status, _)| *status)
+    fn of_word(word: &str) -> Option<RowStatus> {
+        RowStatus::ALL.iter().find(|(_, known)| *known == word).map(|(status, _)| *status)
     }
 
     fn word(self) -> &'static str {
-        Status::ALL.iter().find(|(status, _)| *status == self).map_or("", |(_, word)| word)
+        RowStatus::ALL.iter().find(|(status, _)| *status == self).map_or("", |(_, word)| word)
     }
 }
 
 /// The result of one method on one loop.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct StudyRow {
     /// Number of the loop, from 0.
     pub item: usize,
     /// Degradation of the nominal model, eq. (27).
@@ -50,9 +50,9 @@ pub struct Row {
     /// Peak of the output sensitivity with the true plant.
     pub peak_plant: f64,
     /// The method.
-    pub method: Method,
+    pub method: StudyMethod,
     /// What became of it.
-    pub status: Status,
+    pub status: RowStatus,
     /// Fit (26) on the noise-free record, percent, horizontal and vertical; NaN without a model, minus infinity where the
     /// model's output leaves the range of the numbers.
     pub fit: [f64; 2],
@@ -62,7 +62,7 @@ pub struct Row {
     pub note: String,
 }
 
-impl Row {
+impl StudyRow {
     /// The first line of a results file.
     pub const HEADER: &str = "item,theta,noise_um,command_weight,peak_nominal,peak_plant,method,status,\
                               fit_horizontal,fit_vertical,steps,note,check";
@@ -94,19 +94,19 @@ impl Row {
     }
 
     /// Reads a line; `None` where it is damaged.
-    pub fn parse(line: &str) -> Option<Row> {
+    pub fn parse(line: &str) -> Option<StudyRow> {
         let fields: Vec<&str> = unchecked(line)?.split(',').collect();
         let [item, theta, noise, weight, peak_nominal, peak_plant, method, status, h, v, steps, note] =
             fields.as_slice().try_into().ok()?;
-        Some(Row {
+        Some(StudyRow {
             item: str::parse(item).ok()?,
             theta: str::parse(theta).ok()?,
             noise: str::parse(noise).ok()?,
             command_weight: str::parse(weight).ok()?,
             peak_nominal: str::parse(peak_nominal).ok()?,
             peak_plant: str::parse(peak_plant).ok()?,
-            method: Method::of_key(method)?,
-            status: Status::of_word(status)?,
+            method: StudyMethod::of_key(method)?,
+            status: RowStatus::of_word(status)?,
             fit: [str::parse(h).ok()?, str::parse(v).ok()?],
             steps: if steps.is_empty() { None } else { Some(str::parse(steps).ok()?) },
             note: str::to_owned(note),
@@ -139,16 +139,16 @@ fn check(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn row() -> Row {
-        Row {
+    fn row() -> StudyRow {
+        StudyRow {
             item: 7,
             theta: 0.1 + 0.2,
             noise: 0.2,
             command_weight: 1e9,
             peak_nominal: 1.5,
             peak_plant: f64::INFINITY,
-            method: Method::Pem,
-            status: Status::Unstable,
+            method: StudyMethod::Pem,
+            status: RowStatus::Unstable,
             fit: [f64::NEG_INFINITY, -1.0 / 3.0],
             steps: Some(25),
             note: "a, b\nc".into(),
@@ -157,9 +157,9 @@ mod tests {
 
     #[test]
     fn a_line_reads_back_bit_by_bit() {
-        let expected = Row { note: "a; b;c".into(), ..row() };
-        assert_eq!(Row::parse(&row().line()), Some(expected));
-        assert_eq!(row().line().split(',').count(), Row::HEADER.split(',').count());
+        let expected = StudyRow { note: "a; b;c".into(), ..row() };
+        assert_eq!(StudyRow::parse(&row().line()), Some(expected));
+        assert_eq!(row().line().split(',').count(), StudyRow::HEADER.split(',').count());
     }
 
     #[test]
@@ -168,8 +168,8 @@ mod tests {
         for at in 0..line.len() {
             let mut bytes = line.clone().into_bytes();
             bytes[at] = if bytes[at] == b'7' { b'8' } else { b'7' };
-            assert_eq!(Row::parse(&String::from_utf8(bytes).unwrap()), None, "character {at}");
-            assert_eq!(Row::parse(&line[..at]), None);
+            assert_eq!(StudyRow::parse(&String::from_utf8(bytes).unwrap()), None, "character {at}");
+            assert_eq!(StudyRow::parse(&line[..at]), None);
         }
     }
 }

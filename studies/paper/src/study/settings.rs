@@ -1,6 +1,6 @@
 //! Everything that was chosen for the paper, as one TOML file.
 
-use super::method::Method;
+use super::method::StudyMethod;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -24,7 +24,7 @@ pub struct PaperSettings {
     /// Seed of everything random.
     pub seed: u64,
     /// Methods that the study and the map compare.
-    pub methods: Vec<Method>,
+    pub methods: Vec<StudyMethod>,
     /// Controllers.
     pub controller: StudyController,
     /// Figs 4 and 5.
@@ -144,8 +144,8 @@ impl PaperSettings {
     }
 
     /// The models that are compared: the nominal one, then the methods.
-    pub fn compared(&self) -> impl Iterator<Item = Method> {
-        [Method::Nominal].into_iter().chain(self.methods.iter().copied().filter(|m| *m != Method::Nominal))
+    pub fn compared(&self) -> impl Iterator<Item = StudyMethod> {
+        [StudyMethod::Nominal].into_iter().chain(self.methods.iter().copied().filter(|m| *m != StudyMethod::Nominal))
     }
 
     /// The same with a number of models, and with the coarse map that suits a study of fewer than 100.
@@ -186,7 +186,7 @@ impl PaperSettings {
         positive("experiments.command_weight", &[e.command_weight])?;
         within("experiments.rpm", e.rpm, f64::MIN_POSITIVE, f64::MAX, "a positive number")?;
         filled("experiments.start_factors", &e.start_factors)?;
-        count("methods", self.methods.len(), 1, Method::ALL.len())?;
+        count("methods", self.methods.len(), 1, StudyMethod::ALL.len())?;
         for method in &self.methods {
             let times = self.methods.iter().filter(|other| *other == method).count();
             within(&format!("the number of times that methods names {}", method.key()), times as f64, 1.0, 1.0, "1")?;

@@ -1,15 +1,15 @@
 //! What the rows of a campaign say.
 
-use super::method::Method;
-use super::row::{Row, Status};
+use super::method::StudyMethod;
+use super::row::{RowStatus, StudyRow};
 
 /// Fit of the worse axis, percent, below which a stable model counts as a poor fit.
 pub const POOR_FIT: f64 = 50.0;
 
-impl Row {
+impl StudyRow {
     /// Whether there is no usable model: none, an unstable one, or one with a poor fit on an axis.
     pub fn failed(&self) -> bool {
-        self.status != Status::Stable || self.worse_fit() < POOR_FIT
+        self.status != RowStatus::Stable || self.worse_fit() < POOR_FIT
     }
 }
 
@@ -34,7 +34,7 @@ pub fn median(values: &[f64]) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decile {
     /// The method.
-    pub method: Method,
+    pub method: StudyMethod,
     /// From and to.
     pub theta: [f64; 2],
     /// Loops.
@@ -64,34 +64,34 @@ impl Decile {
 }
 
 /// Medians and failures of a method per tenth of the range of theta; every loop is in exactly one.
-pub fn deciles(rows: &[Row], method: Method, range: [f64; 2]) -> Vec<Decile> {
+pub fn deciles(rows: &[StudyRow], method: StudyMethod, range: [f64; 2]) -> Vec<Decile> {
     let tenth = |theta: f64| (((theta - range[0]) / (range[1] - range[0]) * 10.0) as usize).min(9);
     let bound = |k: usize| range[0] + (range[1] - range[0]) * k as f64 / 10.0;
     (0..10)
         .map(|k| {
-            let inside: Vec<&Row> = rows.iter().filter(|r| r.method == method && tenth(r.theta) == k).collect();
+            let inside: Vec<&StudyRow> = rows.iter().filter(|r| r.method == method && tenth(r.theta) == k).collect();
             summary(method, [bound(k), bound(k + 1)], &inside)
         })
         .collect()
 }
 
 /// Medians and failures of a method over all loops.
-pub fn overall(rows: &[Row], method: Method, range: [f64; 2]) -> Decile {
+pub fn overall(rows: &[StudyRow], method: StudyMethod, range: [f64; 2]) -> Decile {
     summary(method, range, &rows.iter().filter(|r| r.method == method).collect::<Vec<_>>())
 }
 
-fn summary(method: Method, theta: [f64; 2], rows: &[&Row]) -> Decile {
+fn summary(method: StudyMethod, theta: [f64; 2], rows: &[&StudyRow]) -> Decile {
     let axis = |i: usize| median(&rows.iter().map(|r| r.fit[i]).collect::<Vec<_>>());
-    let count = |predicate: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| predicate(r)).count();
+    let count = |predicate: &dyn Fn(&StudyRow) -> bool| rows.iter().filter(|r| predicate(r)).count();
     Decile {
         method,
         theta,
         count: rows.len(),
         median: [axis(0), axis(1)],
         worse: median(&rows.iter().map(|r| r.worse_fit()).collect::<Vec<_>>()),
-        refused: count(&|r| matches!(r.status, Status::Refused | Status::NoController)),
-        unstable: count(&|r| r.status == Status::Unstable),
-        poor_fit: count(&|r| r.status == Status::Stable && r.worse_fit() < POOR_FIT),
+        refused: count(&|r| matches!(r.status, RowStatus::Refused | RowStatus::NoController)),
+        unstable: count(&|r| r.status == RowStatus::Unstable),
+        poor_fit: count(&|r| r.status == RowStatus::Stable && r.worse_fit() < POOR_FIT),
     }
 }
 
@@ -99,21 +99,21 @@ fn summary(method: Method, theta: [f64; 2], rows: &[&Row]) -> Decile {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Winner {
     /// The methods with their median fit of the worse axis, percent, best first.
-    pub ranking: Vec<(Method, f64)>,
+    pub ranking: Vec<(StudyMethod, f64)>,
     /// Lead over the second, percentage points; infinite where there is no second.
     pub margin: f64,
 }
 
 /// Compares the methods by the median over the rows of a cell of the fit of the worse axis; the nominal model does not
 /// compete. `None` where there was no controller.
-pub fn winner(rows: &[&Row]) -> Option<Winner> {
-    let competing: Vec<&&Row> =
-        rows.iter().filter(|r| r.method != Method::Nominal && r.status != Status::NoController).collect();
-    let mut methods: Vec<Method> = competing.iter().map(|r| r.method).collect();
+pub fn winner(rows: &[&StudyRow]) -> Option<Winner> {
+    let competing: Vec<&&StudyRow> =
+        rows.iter().filter(|r| r.method != StudyMethod::Nominal && r.status != RowStatus::NoController).collect();
+    let mut methods: Vec<StudyMethod> = competing.iter().map(|r| r.method).collect();
     methods.sort();
     methods.dedup();
-    let fits = |m: Method| competing.iter().filter(|r| r.method == m).map(|r| r.worse_fit()).collect::<Vec<_>>();
-    let mut ranking: Vec<(Method, f64)> = methods.into_iter().map(|m| (m, median(&fits(m)))).collect();
+    let fits = |m: StudyMethod| competing.iter().filter(|r| r.method == m).map(|r| r.worse_fit()).collect::<Vec<_>>();
+    let mut ranking: Vec<(StudyMethod, f64)> = methods.into_iter().map(|m| (m, median(&fits(m)))).collect();
     ranking.sort_by(|a, b| b.1.total_cmp(&a.1));
     let margin = match ranking.as_slice() {
         [] => return None,

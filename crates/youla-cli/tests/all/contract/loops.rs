@@ -5,7 +5,7 @@ use crate::common::demo;
 use serde_json::Value;
 use std::fs;
 use youla_io::export::ExportedController;
-use youla_run::ModelFile;
+use youla_run::RunModelFile;
 
 #[test]
 fn the_reduction_is_measured_at_every_order() {
@@ -61,7 +61,7 @@ fn the_new_controller_is_exported_with_its_promise() {
     assert_eq!(redesign["band"]["holds"], true);
     let text = fs::read_to_string(demo().join("8-redesign/controller.json")).expect("readable");
     let data: ExportedController = serde_json::from_str(&text).expect("the documented form");
-    let model: ModelFile =
+    let model: RunModelFile =
         serde_json::from_str(&fs::read_to_string(demo().join("8-redesign/new_controller.json")).expect("readable"))
             .expect("a model");
     assert_eq!((&data.controller.a, &data.controller.c), (&model.matrices.a, &model.matrices.c));

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use youla_io::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
-use youla_run::ModelFile;
+use youla_run::RunModelFile;
 
 #[test]
 fn run_toml_of_the_demonstration_reproduces_its_fits() {
@@ -90,7 +90,7 @@ fn matlab_models_equal_the_json_ones() {
     ] {
         let path = demo().join(name);
         let text = fs::read_to_string(path.with_extension("json")).expect("readable");
-        let model: ModelFile = serde_json::from_str(&text).expect("a model");
+        let model: RunModelFile = serde_json::from_str(&text).expect("a model");
         let system = model.system().expect("shapes that fit");
         let variables = read_mat(path.with_extension("mat")).expect("a MATLAB file");
         for (variable, matrix) in [("a", system.a()), ("b", system.b()), ("c", system.c()), ("d", system.d())] {

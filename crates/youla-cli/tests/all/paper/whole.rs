@@ -2,18 +2,18 @@
 
 use super::small::whole;
 use std::fs;
-use youla_paper::study::{Method, PaperSettings, Row};
+use youla_paper::study::{PaperSettings, StudyMethod, StudyRow};
 
 #[test]
 fn no_model_is_lost() {
     for (file, loops) in [("study.csv", 5), ("crossover.csv", 4)] {
         let text = fs::read_to_string(whole().join(file)).expect("readable");
-        let rows: Vec<Row> = text.lines().skip(1).map(|line| Row::parse(line).expect("a row")).collect();
+        let rows: Vec<StudyRow> = text.lines().skip(1).map(|line| StudyRow::parse(line).expect("a row")).collect();
         for method in PaperSettings::shipped().compared() {
             let items: Vec<usize> = rows.iter().filter(|r| r.method == method).map(|r| r.item).collect();
             assert_eq!(items, (0..loops).collect::<Vec<_>>(), "{file}, {method:?}");
         }
-        assert!(!rows.iter().any(|r| r.method != Method::Nominal && r.fit[0] > 100.0), "{file}");
+        assert!(!rows.iter().any(|r| r.method != StudyMethod::Nominal && r.fit[0] > 100.0), "{file}");
     }
 }
 

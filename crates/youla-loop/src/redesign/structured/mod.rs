@@ -26,7 +26,7 @@ mod space;
 mod tests;
 
 pub use margins::GridMargins;
-pub use options::{PidOptions, PidTerms, Structure};
+pub use options::{ControllerStructure, PidOptions, PidTerms};
 pub use pid::{Discretisation, Notch, PidController, PidGains, diagonal};
 pub use plan::PlannedStep;
 pub use proof::{Band, FigureBand, LEVEL, PidProof};

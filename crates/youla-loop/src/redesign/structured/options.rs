@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The structure of a new controller, where it is fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Structure {
+pub enum ControllerStructure {
     /// P, PI, PD or PID with a filtered derivative and notches, one for each loop of a machine with as many outputs as inputs.
     Pid,
 }

@@ -62,7 +62,7 @@ pub(super) fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> DrawnEx
     DrawnExperiment { name: "estimation".into(), clock, signals }
 }
 
-pub(super) fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: usize) -> FrequencyResponse {
+pub(super) fn frequency(plan: &Plan, models: &[(DrawnMethod, Modal)], outputs: usize, inputs: usize) -> DrawnResponses {
     let grid = |points: usize| -> Vec<f64> {
         let ratio = plan.band.1 / plan.band.0;
         (0..points).map(|k| plan.band.0 * ratio.powf(k as f64 / (points - 1) as f64)).collect()
@@ -70,7 +70,7 @@ pub(super) fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize,
     let hz = grid(500);
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut noise = move || -> f64 { StandardNormal.sample(&mut random) };
-    let mut response = FrequencyResponse { hz: hz.clone(), ..FrequencyResponse::default() };
+    let mut response = DrawnResponses { hz: hz.clone(), ..DrawnResponses::default() };
     for output in 0..outputs {
         for input in 0..inputs {
             for (method, model) in models {
@@ -114,11 +114,11 @@ pub(super) fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize,
 }
 
 /// A region of 5 % about each value.
-fn region(output: usize, input: usize, values: &[c64]) -> Band {
+fn region(output: usize, input: usize, values: &[c64]) -> DrawnBand {
     let db = |factor: f64| values.iter().map(|g| 20.0 * (factor * g.norm()).log10()).collect();
     let circle = |g: &c64| [(0.05 * g.norm()).powi(2), 0.0, (0.05 * g.norm()).powi(2)];
     let region = values.iter().flat_map(circle).collect();
-    Band { method: "hansen".into(), output, input, level: 0.95, low_db: db(0.95), high_db: db(1.05), region }
+    DrawnBand { method: "hansen".into(), output, input, level: 0.95, low_db: db(0.95), high_db: db(1.05), region }
 }
 
 /// Made up: one curve above the other.

@@ -90,16 +90,16 @@ pub(crate) fn three_by_three() -> ReportData {
 fn report(plan: &Plan) -> ReportData {
     let (ts, outputs, inputs) = (plan.ts, plan.outputs.len(), plan.inputs.len());
     let models = [
-        (Method::nominal(), plan.plant.with(0.86, 2.4, 0.8)),
-        (Method::direct(), plan.plant.with(1.03, 1.5, 0.95)),
-        (Method::hansen(), plan.plant.with(1.001, 1.02, 1.0)),
-        (Method::hansen_reduced(), plan.plant.with(1.0015, 1.05, 0.997)),
+        (DrawnMethod::nominal(), plan.plant.with(0.86, 2.4, 0.8)),
+        (DrawnMethod::direct(), plan.plant.with(1.03, 1.5, 0.95)),
+        (DrawnMethod::hansen(), plan.plant.with(1.001, 1.02, 1.0)),
+        (DrawnMethod::hansen_reduced(), plan.plant.with(1.0015, 1.05, 0.997)),
     ];
     let mut data = ReportData {
         summary: "Identified in closed loop by the Hansen scheme and by direct N4SID; compared on records that were not used.".into(),
         program: "youla 0.2.0".into(),
         settings: "[data]\nestimation = [\"record.csv\"]\nsample_time = 2e-4\n\n[controller]\nfeedback = \"negative\"\n\n[identify]\norder = 8\nfeedthrough = \"none\"\nstability = \"require\"\n".into(),
-        sources: vec![Source {
+        sources: vec![SourceFile {
             path: "record.csv".into(),
             purpose: "estimation and verification".into(),
             sha256: "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".into(),
@@ -110,17 +110,17 @@ fn report(plan: &Plan) -> ReportData {
         methods: models.iter().map(|(method, _)| method.clone()).collect(),
         verdict: verdict(),
         further: vec![Verdict {
-            status: Status::Bad,
+            status: LineStatus::Bad,
             text: "The peak sensitivity of the loop is 7.46.".into(),
             evidence: ReportPart::Margins,
         }],
         notes: vec![
-            Note { status: Status::Caution, text: "Input u was saturated in 0.3 % of the samples; the measured input was used.".into() },
-            Note { status: Status::Info, text: "The first 500 samples of each record were skipped.".into() },
+            Note { status: LineStatus::Caution, text: "Input u was saturated in 0.3 % of the samples; the measured input was used.".into() },
+            Note { status: LineStatus::Info, text: "The first 500 samples of each record were skipped.".into() },
         ],
         bezout_residual: Some(3.1e-14),
         stages: [("read", 0.412), ("factor", 0.003), ("signals", 0.061), ("identify", 0.743), ("validate", 0.218)]
-            .map(|(name, seconds)| Stage { name: name.into(), seconds })
+            .map(|(name, seconds)| StageTime { name: name.into(), seconds })
             .into(),
         parameters: ["stiffness", "damping"]
             .map(|name| PhysicalParameter {
@@ -143,7 +143,7 @@ fn report(plan: &Plan) -> ReportData {
                 PhysicalStructure { name: "with a lag".into(), failure: Some("no start".into()), ..Default::default() },
             ],
         }),
-        reduction: Some(Reduction {
+        reduction: Some(DrawnReduction {
             label: "G(S) of order 12 by balanced truncation".into(),
             hankel: vec![31.0, 29.5, 12.1, 11.4, 0.21, 0.12, 0.03, 0.01, 2e-3, 1e-3, 3e-4, 1e-6],
             chosen: 4,
@@ -151,7 +151,7 @@ fn report(plan: &Plan) -> ReportData {
             plant_norm: Some(60.0),
             orders: (1..=6).map(reduced_to).collect(),
             sentence: "The controller stabilises the reduced model of order 4.".into(),
-            ..Reduction::default()
+            ..DrawnReduction::default()
         }),
         ..ReportData::default()
     };
@@ -173,7 +173,7 @@ fn report(plan: &Plan) -> ReportData {
                     method: method.key.clone(),
                     fit: Some(fit(&y[output], &residual)),
                 });
-                predictions.push(Prediction {
+                predictions.push(DrawnPrediction {
                     method: method.key.clone(),
                     predicted: trace(&predicted),
                     residual: trace(&residual),
@@ -194,7 +194,7 @@ fn report(plan: &Plan) -> ReportData {
         for (hz, zeta, _) in &model.modes {
             let z = Modal::pole(*hz, *zeta, ts);
             poles.extend([[z.re, z.im], [z.re, -z.im]]);
-            data.modes.push(Mode {
+            data.modes.push(DrawnMode {
                 method: method.key.clone(),
                 hz: *hz,
                 zeta: *zeta,
@@ -212,8 +212,12 @@ fn report(plan: &Plan) -> ReportData {
             worst_closed_loop_pole: Some(if place == 1 { [0.9989, 0.0613] } else { [0.9812, 0.1023] }),
         });
         let stable = place != 1;
-        let disk =
-            DiskMargin { alpha: Some(0.6), lowest_gain: Some(0.54), highest_gain: Some(1.86), phase_deg: Some(33.4) };
+        let disk = DrawnDiskMargin {
+            alpha: Some(0.6),
+            lowest_gain: Some(0.54),
+            highest_gain: Some(1.86),
+            phase_deg: Some(33.4),
+        };
         let figures = Robustness {
             peak_sensitivity: Some(2.314),
             iso_14839_zone: Some(IsoZone::A),
@@ -248,11 +252,11 @@ fn report(plan: &Plan) -> ReportData {
 
 fn verdict() -> Vec<Verdict> {
     [
-        (Status::Good, "The Hansen model predicts unused data with fits of 83.1 to 91.4 %, against 21.5 % at best for the nominal model.", ReportPart::Fits),
-        (Status::Good, "S is stable and the logged controller stabilises G(S): worst closed-loop pole at |z| = 0.9865.", ReportPart::Certificate),
-        (Status::Good, "It follows the model-free indirect response to 0.8 dB rms over 20 to 400 Hz.", ReportPart::Frequency),
-        (Status::Caution, "Directly identified, the model is not stabilised by the controller under which the data were taken.", ReportPart::Poles),
-        (Status::Good, "Four states suffice: the reduced model loses 0.4 points of fit.", ReportPart::Reduction),
+        (LineStatus::Good, "The Hansen model predicts unused data with fits of 83.1 to 91.4 %, against 21.5 % at best for the nominal model.", ReportPart::Fits),
+        (LineStatus::Good, "S is stable and the logged controller stabilises G(S): worst closed-loop pole at |z| = 0.9865.", ReportPart::Certificate),
+        (LineStatus::Good, "It follows the model-free indirect response to 0.8 dB rms over 20 to 400 Hz.", ReportPart::Frequency),
+        (LineStatus::Caution, "Directly identified, the model is not stabilised by the controller under which the data were taken.", ReportPart::Poles),
+        (LineStatus::Good, "Four states suffice: the reduced model loses 0.4 points of fit.", ReportPart::Reduction),
     ]
     .map(|(status, text, evidence)| Verdict { status, text: text.into(), evidence })
     .into()

@@ -9,7 +9,7 @@
 
 use crate::records::RunRecords;
 use crate::records::disturbance::without_lines;
-use crate::settings::Prediction;
+use crate::settings::PredictionKind;
 use crate::stages::context::RunContext;
 use crate::stages::signals::DeviationSignals;
 use crate::{Error, Result};
@@ -87,15 +87,15 @@ struct Closed {
 
 impl<'a> Criterion<'a> {
     pub(crate) fn new(
-        prediction: Prediction,
+        prediction: PredictionKind,
         run: RunContext<'a>,
         outputs: &'a [Mat<f64>],
         options: &'a HansenPemOptions,
     ) -> Result<Self> {
         let records = run.records;
         let closed = match prediction {
-            Prediction::OpenLoop => None,
-            Prediction::ClosedLoop => Some(Closed::new(run)?),
+            PredictionKind::OpenLoop => None,
+            PredictionKind::ClosedLoop => Some(Closed::new(run)?),
         };
         Ok(Criterion { records, outputs, options, closed })
     }

@@ -6,7 +6,7 @@ pub(crate) mod robustness;
 
 use crate::method::Method;
 use crate::records::disturbance::without_lines;
-use crate::settings::Prediction;
+use crate::settings::PredictionKind;
 use crate::stages::context::RunContext;
 use crate::stages::grey_box::GreyBoxRun;
 use crate::stages::reduction::RunReduction;
@@ -85,7 +85,7 @@ pub(crate) fn residue_at(visible: &VisibleModes, pole: c64) -> Option<&[c64]> {
 #[derive(Debug, Clone)]
 pub struct Validation {
     /// What drove the models on the verification records.
-    pub prediction: Prediction,
+    pub prediction: PredictionKind,
     /// One entry per model that exists.
     pub models: Vec<ModelValidation>,
     /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none.
@@ -201,8 +201,8 @@ pub(crate) fn verify_record(
     let lines = record.disturbance();
     let measured = without_lines(record.y(), lines)?;
     let predicted = match run.prediction() {
-        Prediction::OpenLoop => predict_open_loop(model, record.u(), measured.as_ref()),
-        Prediction::ClosedLoop => {
+        PredictionKind::OpenLoop => predict_open_loop(model, record.u(), measured.as_ref()),
+        PredictionKind::ClosedLoop => {
             let factors = run.factorisation.filter(|_| record.alpha().is_some()).map(|f| &f.factors);
             let ports = factors.map_or_else(|| with_input_port(run.declared.controller()), |f| f.j_k())?;
             let excitation =

@@ -10,7 +10,7 @@
 //! controller is stable by itself, which one that integrates is not. There, none is used.
 
 use crate::Result;
-use crate::settings::Prediction;
+use crate::settings::PredictionKind;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
@@ -24,8 +24,11 @@ use youla_greybox::GreyBoxModel;
 ///
 /// # Errors
 /// Ports.
-pub(crate) fn noise_of_direct(prediction: Prediction, direct: &SubspaceModel) -> Result<Option<StateSpace<Discrete>>> {
-    let gain = direct.innovation.gain().filter(|_| prediction == Prediction::OpenLoop);
+pub(crate) fn noise_of_direct(
+    prediction: PredictionKind,
+    direct: &SubspaceModel,
+) -> Result<Option<StateSpace<Discrete>>> {
+    let gain = direct.innovation.gain().filter(|_| prediction == PredictionKind::OpenLoop);
     gain.map(|gain| innovations(&direct.model, gain)).transpose()
 }
 
@@ -34,11 +37,11 @@ pub(crate) fn noise_of_direct(prediction: Prediction, direct: &SubspaceModel) ->
 /// # Errors
 /// Ports.
 pub(crate) fn noise_of_recommended(
-    prediction: Prediction,
+    prediction: PredictionKind,
     found: &Recommendation,
 ) -> Result<Option<StateSpace<Discrete>>> {
     let predictor = &found.predictor;
-    let Some(gain) = predictor.k.as_ref().filter(|_| prediction == Prediction::OpenLoop) else { return Ok(None) };
+    let Some(gain) = predictor.k.as_ref().filter(|_| prediction == PredictionKind::OpenLoop) else { return Ok(None) };
     let one = eye(predictor.c.nrows());
     let h = StateSpace::new(predictor.a.clone(), gain.clone(), predictor.c.clone(), one, found.plant.time())?;
     Ok(Some(h))
@@ -48,8 +51,11 @@ pub(crate) fn noise_of_recommended(
 ///
 /// # Errors
 /// Ports.
-pub(crate) fn noise_of_structure(prediction: Prediction, found: &GreyBoxModel) -> Result<Option<StateSpace<Discrete>>> {
-    let gain = found.gain.as_ref().filter(|_| prediction == Prediction::OpenLoop);
+pub(crate) fn noise_of_structure(
+    prediction: PredictionKind,
+    found: &GreyBoxModel,
+) -> Result<Option<StateSpace<Discrete>>> {
+    let gain = found.gain.as_ref().filter(|_| prediction == PredictionKind::OpenLoop);
     gain.map(|gain| innovations(&found.model, gain.as_ref())).transpose()
 }
 
@@ -58,11 +64,11 @@ pub(crate) fn noise_of_structure(prediction: Prediction, found: &GreyBoxModel) -
 /// # Errors
 /// Ports, and `Mt + S Ut` without invertible feedthrough.
 pub(crate) fn noise_of_hansen(
-    prediction: Prediction,
+    prediction: PredictionKind,
     factors: &CoprimeFactors<Discrete>,
     hansen: &HansenModel,
 ) -> Result<Option<StateSpace<Discrete>>> {
-    let gain = hansen.deviation.innovation.gain().filter(|_| prediction == Prediction::OpenLoop);
+    let gain = hansen.deviation.innovation.gain().filter(|_| prediction == PredictionKind::OpenLoop);
     let Some(gain) = gain else { return Ok(None) };
     let s = &hansen.deviation.model;
     Ok(factors.noise_of(s, &innovations(s, gain)?).map(Some)?)

@@ -49,7 +49,7 @@ pub use known_loop::{LoopKnowledge, LoopSignals};
 pub(crate) use measured::recommend_from_response;
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance};
 pub use options::LikelihoodOptions;
-pub use recommendation::{Candidate, Evidence, Outcome, Predictor, Recommendation, figure};
+pub use recommendation::{Candidate, Evidence, Predictor, Recommendation, TestOutcome, figure};
 
 use super::verdict::limits::{BAND_RATIO, CANCELLED_MODE};
 use super::verdict::{self, Judged, Judgement, Parts, Witness};

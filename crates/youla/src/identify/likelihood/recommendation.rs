@@ -87,7 +87,7 @@ impl Recommendation {
     /// Whether the description of the loop agrees with the log, whatever the model is worth: the stated controller explains the logged inputs.
     /// `None` where no controller was stated or nothing could be asked.
     pub fn description(&self) -> Option<bool> {
-        let asked = |e: &&Evidence| e.question.ends_with(OF_DESCRIPTION) && e.outcome != Outcome::NotTested;
+        let asked = |e: &&Evidence| e.question.ends_with(OF_DESCRIPTION) && e.outcome != TestOutcome::NotTested;
         self.evidence.iter().find(asked).map(Evidence::holds)
     }
 
@@ -156,7 +156,7 @@ pub struct Candidate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
-pub enum Outcome {
+pub enum TestOutcome {
     /// The figure is within its limit, or chance explains it.
     Passed,
     /// It is not.
@@ -179,7 +179,7 @@ pub struct Evidence {
     /// explains is accepted whatever its size.
     pub significance: Option<f64>,
     /// Passed, failed or not tested.
-    pub outcome: Outcome,
+    pub outcome: TestOutcome,
     /// Whether a model is trusted only where this test is passed; other tests name an imperfection with its size.
     pub required: bool,
     /// Where the figure was found, Hz.
@@ -191,7 +191,7 @@ pub struct Evidence {
 impl Evidence {
     /// A required test: a figure with the largest that is accepted.
     pub fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
-        let outcome = if figure <= limit { Outcome::Passed } else { Outcome::Failed };
+        let outcome = if figure <= limit { TestOutcome::Passed } else { TestOutcome::Failed };
         let (question, note) = (question.into(), String::new());
         Evidence { question, figure, limit, significance: None, outcome, required: true, hz: None, note }
     }
@@ -199,12 +199,12 @@ impl Evidence {
     /// A required test that the records cannot answer.
     pub(crate) fn untested(question: impl Into<String>, limit: f64, why: impl Into<String>) -> Self {
         let open = Evidence::new(question, f64::NAN, limit);
-        Evidence { outcome: Outcome::NotTested, note: why.into(), ..open }
+        Evidence { outcome: TestOutcome::NotTested, note: why.into(), ..open }
     }
 
     pub(crate) fn beyond_chance(self, significance: f64) -> Self {
-        let passed = self.outcome == Outcome::Passed || significance <= BEYOND_CHANCE;
-        let outcome = if passed { Outcome::Passed } else { Outcome::Failed };
+        let passed = self.outcome == TestOutcome::Passed || significance <= BEYOND_CHANCE;
+        let outcome = if passed { TestOutcome::Passed } else { TestOutcome::Failed };
         Evidence { significance: Some(significance), outcome, ..self }
     }
 
@@ -223,7 +223,7 @@ impl Evidence {
     /// With its remedy, where it is not passed.
     #[must_use]
     pub(crate) fn remedy(self, remedy: &str) -> Self {
-        if self.outcome == Outcome::Passed { self } else { self.noted(remedy) }
+        if self.outcome == TestOutcome::Passed { self } else { self.noted(remedy) }
     }
 
     /// With a remark on the figure.
@@ -242,13 +242,13 @@ impl Evidence {
 
     /// Whether the test is passed, or is not required.
     pub fn holds(&self) -> bool {
-        !self.required || self.outcome == Outcome::Passed
+        !self.required || self.outcome == TestOutcome::Passed
     }
 }
 
 impl std::fmt::Display for Evidence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.outcome == Outcome::NotTested {
+        if self.outcome == TestOutcome::NotTested {
             return write!(f, "{}: not tested, {}", self.question, self.note);
         }
         write!(f, "{} {} (limit {})", self.question, self.value(), self.limit)?;

@@ -1,7 +1,7 @@
 //! Each test of the verdict with one planted fault that fires it, beside the same loop without the fault.
 
 use crate::control::{RunningController, closed_loop, with_input_port};
-use crate::identify::likelihood::{Evidence, LikelihoodOptions, Outcome};
+use crate::identify::likelihood::{Evidence, LikelihoodOptions, TestOutcome};
 use crate::identify::{Identified, identify};
 use crate::linalg::block;
 use crate::lti::{Continuous, Discrete, StateSpace, frequency_response, simulate};
@@ -77,7 +77,7 @@ fn outcome<'a>(found: &'a Identified, name: &str) -> &'a Evidence {
 fn a_clean_loop_passes_every_test() {
     let found = CLEAN.identified(1.0, &LikelihoodOptions::default());
     assert!(found.trusted(), "{:?}", found.reasons());
-    assert!(found.model.evidence.iter().all(|e| e.outcome == Outcome::Passed), "{:?}", found.model.evidence);
+    assert!(found.model.evidence.iter().all(|e| e.outcome == TestOutcome::Passed), "{:?}", found.model.evidence);
     let r = found.model.loop_ratio.as_ref().unwrap();
     assert!(r.largest < 0.1 && r.ratio.iter().all(|ratio| *ratio <= r.largest), "{}", r.largest);
     assert!(
@@ -96,7 +96,7 @@ fn a_clean_loop_passes_every_test() {
 #[test]
 fn a_controller_of_another_gain_is_noticed_and_does_not_spoil_the_model() {
     let found = CLEAN.identified(1.4, &LikelihoodOptions::default());
-    assert_eq!(outcome(&found, "(controller)").outcome, Outcome::Failed);
+    assert_eq!(outcome(&found, "(controller)").outcome, TestOutcome::Failed);
     let right = CLEAN.identified(1.0, &LikelihoodOptions::default());
     let apart = (found.model.plant.d()[(0, 0)] - right.model.plant.d()[(0, 0)]).abs();
     assert!(apart < 1e-6, "the direct path differs by {apart}");
@@ -121,7 +121,7 @@ fn a_missing_mode_is_named_with_its_frequency() {
     let few = LikelihoodOptions { order: Some(1), ..Default::default() };
     let found = CLEAN.identified(1.0, &few);
     let test = outcome(&found, "(indirect response)");
-    assert_eq!(test.outcome, Outcome::Failed);
+    assert_eq!(test.outcome, TestOutcome::Failed);
     let [low, high] = test.hz.unwrap();
     assert!(low < 60.0 && 60.0 < high && high < 120.0, "{low} to {high} Hz, the mode is at 60 Hz");
     assert!(test.note.contains("the model is likely wrong there"), "{}", test.note);
@@ -144,7 +144,7 @@ fn a_missing_mode_is_named_with_its_frequency() {
 fn a_machine_that_changes_is_not_repeatable() {
     let changed = Planted { second_gain: 1.8, ..CLEAN };
     let found = changed.identified(1.0, &LikelihoodOptions::default());
-    assert_eq!(outcome(&found, "(repeatability)").outcome, Outcome::Failed, "{:?}", found.model.evidence);
+    assert_eq!(outcome(&found, "(repeatability)").outcome, TestOutcome::Failed, "{:?}", found.model.evidence);
     // The difference between the halves is in the region: at low frequency at least a quarter of the response.
     let region = &found.model.region;
     let k = region.hz.partition_point(|hz| *hz < 3.0);
@@ -173,7 +173,7 @@ fn noise_that_the_feedback_brings_to_the_inputs_is_no_excitation() {
     let found = narrow.identified(1.0, &LikelihoodOptions::default());
     assert!(!found.trusted());
     let test = outcome(&found, "(information)");
-    assert_ne!(test.outcome, Outcome::Passed, "{test}");
+    assert_ne!(test.outcome, TestOutcome::Passed, "{test}");
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn a_region_wider_than_half_of_the_margin_is_no_evidence() {
     let noisy = Planted { noise: 30.0, samples: 1200, ..CLEAN };
     let found = noisy.identified(1.0, &LikelihoodOptions { order: Some(3), ..Default::default() });
     let test = outcome(&found, "(region)");
-    assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
+    assert!(test.outcome == TestOutcome::Failed && test.figure > 0.5, "{test}");
 }
 
 /// With 0.06 of a period more than 300 in the record, and with whole periods, which have no ends.
@@ -204,7 +204,7 @@ fn mains_are_taken_out_and_are_no_mode_of_the_plant() {
 fn a_model_of_neither_half_is_no_model() {
     let found = Planted { second_gain: 3.0, ..CLEAN }.identified(1.0, &LikelihoodOptions::default());
     let test = outcome(&found, "(same model)");
-    assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
+    assert!(test.outcome == TestOutcome::Failed && test.figure > 0.5, "{test}");
 }
 
 /// What is neither linear nor constant in the clean loop.
@@ -268,7 +268,7 @@ fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
     assert!(none.trusted() && little.trusted(), "{:?} {:?}", none.reasons(), little.reasons());
     let [of_none, of_little] = [&none, &little].map(distortion);
     assert!(of_none == 0.0 && of_little > 0.005, "{of_none} {of_little}");
-    assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
+    assert_eq!(outcome(&much, "(nonlinearity)").outcome, TestOutcome::Failed);
 }
 
 /// Friction against the sign of an output that is a velocity is named as such, with 1 to 5 % of the input.
@@ -286,7 +286,7 @@ fn dry_friction_of_a_speed_is_named_and_widens_the_region() {
 fn a_time_limit_keeps_what_is_found() {
     let [none, all, free] = [Some(0), Some(600), None]
         .map(|time_limit| CLEAN.identified(1.0, &LikelihoodOptions { time_limit, ..Default::default() }));
-    assert_eq!(outcome(&none, "(time limit").outcome, Outcome::Failed);
+    assert_eq!(outcome(&none, "(time limit").outcome, TestOutcome::Failed);
     assert!(none.model.candidates.len() < free.model.candidates.len(), "{}", none.model.candidates.len());
     assert!(all.model.evidence == free.model.evidence);
 }
@@ -310,8 +310,8 @@ fn play_at_the_output_is_named() {
 fn a_gain_that_drifts_is_named_with_its_size() {
     let [clean, drifts] =
         [0.0, 0.06].map(|drift| outcome(&with(&Fault { drift, ..NONE }), "(drift of the gain)").clone());
-    assert!(clean.significance.unwrap() < 3.0 && clean.outcome == Outcome::Passed, "{clean}");
-    assert!(drifts.outcome == Outcome::Failed && !drifts.required, "{drifts}");
+    assert!(clean.significance.unwrap() < 3.0 && clean.outcome == TestOutcome::Passed, "{clean}");
+    assert!(drifts.outcome == TestOutcome::Failed && !drifts.required, "{drifts}");
     assert!((drifts.figure / 0.06 - 1.0).abs() < 0.1, "{drifts}");
 }
 
@@ -323,10 +323,10 @@ fn a_command_logged_before_its_limit_is_judged_by_what_the_limit_takes() {
     for (found, name) in [(&rare, "saturation at 2"), (&often, "saturation at 1 "), (&dead, "a dead zone of 0.0")] {
         let test = outcome(found, "(nonlinearity)");
         assert!(test.note.contains(name), "{test}");
-        assert_eq!(outcome(found, "(saturation)").outcome, Outcome::Passed, "{}", outcome(found, "(saturation)"));
+        assert_eq!(outcome(found, "(saturation)").outcome, TestOutcome::Passed, "{}", outcome(found, "(saturation)"));
     }
     assert!(rare.trusted() && dead.trusted(), "{:?} {:?}", rare.reasons(), dead.reasons());
-    assert_eq!(outcome(&often, "(nonlinearity)").outcome, Outcome::Failed);
+    assert_eq!(outcome(&often, "(nonlinearity)").outcome, TestOutcome::Failed);
 }
 
 /// `u = 0.8 (what the limit left) - 0.05 y`: the law of the file holds but for the samples after those at the limit.
@@ -354,7 +354,7 @@ fn a_law_that_goes_on_from_the_limited_input_is_the_stated_one() {
         identify(std::slice::from_ref(&record), &[], &running, None, &LikelihoodOptions::default()).unwrap()
     });
     let test = outcome(&right, "(controller)");
-    assert!(test.outcome == Outcome::Passed && test.note.contains("logged before a limit"), "{test}");
+    assert!(test.outcome == TestOutcome::Passed && test.note.contains("logged before a limit"), "{test}");
     assert!(right.trusted(), "{:?}", right.reasons());
     assert!(!outcome(&wrong, "(controller)").note.contains("before a limit"), "{}", outcome(&wrong, "(controller)"));
 }

@@ -5,7 +5,7 @@ use crate::Result;
 use crate::story::order::{differences, lacking_in_words};
 use crate::story::words::{both, count, excitation, short};
 use crate::story::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
-use crate::study::{Method, Paper, StudyExperiment};
+use crate::study::{Paper, StudyExperiment, StudyMethod};
 use youla_report::figure::Figure;
 use youla_report::story::section;
 use youla_report::story::{Block, Section};
@@ -49,7 +49,7 @@ fn figures_in_order(list: &[StudyExperiment]) -> Vec<Figure> {
 
 /// A nominal model that is far below the paper's.
 fn nominal_below(paper: &Paper, x: &StudyExperiment) -> Option<String> {
-    let (ours, theirs) = (figures::fit_of(x, Method::Nominal), x.case.published[0]);
+    let (ours, theirs) = (figures::fit_of(x, StudyMethod::Nominal), x.case.published[0]);
     if x.case.a_factor > 0.9 || (0..2).all(|i| ours[i] > theirs[i] - 20.0) {
         return None;
     }
@@ -69,8 +69,8 @@ fn nominal_below(paper: &Paper, x: &StudyExperiment) -> Option<String> {
 
 /// Why the paper's PEM is low with a poor nominal model.
 fn local_minimum(paper: &Paper, x: &StudyExperiment) -> String {
-    let single = figures::fit_of(x, Method::Pem);
-    let best = figures::fit_of(x, Method::PemMultiStart);
+    let single = figures::fit_of(x, StudyMethod::Pem);
+    let best = figures::fit_of(x, StudyMethod::PemMultiStart);
     let published = x.case.published[1];
     let mut text = format!(
         "{}: the paper's PEM reaches {}, ours {} from the nominal model and {} as the best of several starts. The noise is white at \
@@ -94,7 +94,7 @@ pub(in crate::story) fn reduction(paper: &Paper) -> Result<Section> {
         .experiments
         .list
         .iter()
-        .filter_map(|x| figures::of(x, Method::Hansen)?.model.as_ref().ok().map(|g| g.order()))
+        .filter_map(|x| figures::of(x, StudyMethod::Hansen)?.model.as_ref().ok().map(|g| g.order()))
         .collect();
     let order = orders.iter().max().map_or_else(|| "no model".into(), |n| format!("{n} states"));
     let text = format!(

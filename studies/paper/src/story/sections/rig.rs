@@ -4,7 +4,7 @@ use crate::Result;
 use crate::story::order::lacking_in_words;
 use crate::story::words::{and, both, count, percent, short};
 use crate::story::{figures_experiments, figures_study, tables_nominal, tables_rig};
-use crate::study::{Method, Paper, Row, Status};
+use crate::study::{Paper, RowStatus, StudyMethod, StudyRow};
 use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
@@ -69,9 +69,9 @@ pub(in crate::story) fn controller(paper: &Paper) -> Section {
 
 /// The range of the weights that were chosen.
 fn chosen(paper: &Paper) -> String {
-    let rows = || paper.study.iter().filter(|r| r.method == Method::Nominal);
-    let with_loop: Vec<&Row> = rows().filter(|r| r.status != Status::NoController).collect();
-    let by_weight = |a: &&&Row, b: &&&Row| a.command_weight.total_cmp(&b.command_weight);
+    let rows = || paper.study.iter().filter(|r| r.method == StudyMethod::Nominal);
+    let with_loop: Vec<&StudyRow> = rows().filter(|r| r.status != RowStatus::NoController).collect();
+    let by_weight = |a: &&&StudyRow, b: &&&StudyRow| a.command_weight.total_cmp(&b.command_weight);
     let (Some(low), Some(high)) = (with_loop.iter().min_by(by_weight), with_loop.iter().max_by(by_weight)) else {
         return "No model of the study has a controller.".into();
     };

@@ -3,7 +3,7 @@
 use crate::story::claims::Claim;
 use crate::story::words::{count, range, short};
 use crate::story::{claims_study, figures_study, map as crossover, tables_study};
-use crate::study::{Method, Paper, Row};
+use crate::study::{Paper, StudyMethod, StudyRow};
 use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
@@ -57,11 +57,13 @@ pub(in crate::story) fn study(paper: &Paper) -> Section {
 
 /// How PEM compares in the loops in which it leaves a usable model.
 fn where_pem_arrives(paper: &Paper) -> Option<String> {
-    let usable: Vec<&Row> = paper.study.iter().filter(|r| r.method == Method::Pem && !r.failed()).collect();
-    let rivals = |p: &Row| {
-        let other =
-            |r: &&Row| r.item == p.item && matches!(r.method, Method::Direct | Method::Hansen | Method::HansenReduced);
-        paper.study.iter().filter(other).map(Row::worse_fit).fold(f64::NEG_INFINITY, f64::max)
+    let usable: Vec<&StudyRow> = paper.study.iter().filter(|r| r.method == StudyMethod::Pem && !r.failed()).collect();
+    let rivals = |p: &StudyRow| {
+        let other = |r: &&StudyRow| {
+            r.item == p.item
+                && matches!(r.method, StudyMethod::Direct | StudyMethod::Hansen | StudyMethod::HansenReduced)
+        };
+        paper.study.iter().filter(other).map(StudyRow::worse_fit).fold(f64::NEG_INFINITY, f64::max)
     };
     let best = usable.iter().filter(|p| p.worse_fit() >= rivals(p)).count();
     (!usable.is_empty()).then(|| {

@@ -3,7 +3,7 @@
 use crate::story::tables::{method_row, plain, row};
 use crate::story::tables_experiments::seconds;
 use crate::story::words::{count, short};
-use crate::study::{Method, Paper};
+use crate::study::{Paper, StudyMethod};
 use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
@@ -45,17 +45,17 @@ pub(in crate::story) fn timing(paper: &Paper, key: &str) -> Section {
 /// What the paper says of the time of PEM, and what it takes here.
 fn comparison(paper: &Paper) -> String {
     let says = "The paper says that PEM takes considerably longer than the identification of S";
-    let ms = |m: Method| paper.timing.method_ms.iter().find(|(method, _)| *method == m).map(|(_, ms)| *ms);
-    let seconds = |m: Method| {
+    let ms = |m: StudyMethod| paper.timing.method_ms.iter().find(|(method, _)| *method == m).map(|(_, ms)| *ms);
+    let seconds = |m: StudyMethod| {
         let models = paper.experiments.list.iter().flat_map(|e| &e.models);
         models.filter(|found| found.method == m).map(|found| found.seconds).sum::<f64>()
     };
     let experiments = format!(
         "in the three experiments PEM takes {} s together and the Hansen scheme {} s",
-        short(seconds(Method::Pem), 2),
-        short(seconds(Method::Hansen), 2)
+        short(seconds(StudyMethod::Pem), 2),
+        short(seconds(StudyMethod::Hansen), 2)
     );
-    match (ms(Method::Pem), ms(Method::Hansen)) {
+    match (ms(StudyMethod::Pem), ms(StudyMethod::Hansen)) {
         (Some(pem), Some(hansen)) if hansen > 0.0 && paper.timing.loops > 0 => {
             let verdict = match pem / hansen {
                 ratio if ratio >= 2.0 => "this comes out",

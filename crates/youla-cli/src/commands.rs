@@ -68,6 +68,7 @@ fn identify_and_write(
         Some(target) => RunFolder::create(target, output.force)?,
         None => RunFolder::numbered(Path::new(""), &settings.name)?,
     };
+    place.require_unread(&settings.files(folder))?;
     let progress = Progress::new(form.is_silent());
     let mut announce = |stage: Stage| {
         progress.show(&format!("[{}/{}] {}", stage as usize + 1, Stage::COUNT, stage.name()));

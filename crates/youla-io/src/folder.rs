@@ -100,6 +100,17 @@ impl RunFolder {
         Err(Error::OutputExists { path: runs })
     }
 
+    /// Refuses to replace an older run from which a file is `read`: what it was made from would be lost.
+    ///
+    /// # Errors
+    /// [`Error::NotReplaced`].
+    pub fn require_unread(&self, read: &[PathBuf]) -> Result<()> {
+        let within = |file: &&PathBuf| Some(file.canonicalize().ok()?.starts_with(self.target.canonicalize().ok()?));
+        let Some(file) = read.iter().find(|file| within(file) == Some(true)) else { return Ok(()) };
+        let problem = format!("the run reads {} from it", file.display());
+        Err(Error::NotReplaced { path: self.target.clone(), problem })
+    }
+
     /// Where it will be.
     pub fn target(&self) -> &Path {
         &self.target

@@ -44,6 +44,19 @@ fn only_files_of_a_run_are_replaced() {
     assert_eq!(fs::read_dir(&place.0).unwrap().count(), 1, "nothing is left beside it");
 }
 
+/// A model of an older run that the new one starts from would be lost.
+#[test]
+fn what_is_read_is_not_replaced() {
+    let place = Place::new("read");
+    let (run, log) = (place.0.join("run"), place.0.join("log.csv"));
+    fs::write(&log, "t,u").unwrap();
+    write(&run, false, &["6-model/model.json"]).unwrap();
+    let next = RunFolder::create(&run, true).unwrap();
+    assert!(next.require_unread(&[log.clone(), place.0.join("absent.json")]).is_ok());
+    let refused = next.require_unread(&[log, run.join("6-model/../6-model/model.json")]).unwrap_err().to_string();
+    assert!(refused.contains("the run reads") && refused.contains("model.json from it"), "{refused}");
+}
+
 /// What looks like a run but has no list is not one.
 #[test]
 fn a_folder_without_a_list_is_kept() {

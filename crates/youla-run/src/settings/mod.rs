@@ -183,6 +183,12 @@ impl RunSettings {
         })
     }
 
+    /// The files that a run reads, below the folder of the settings: logs, models and measured responses.
+    pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
+        let all = serde_json::to_value(self).unwrap_or_default();
+        file_names(&all).into_iter().map(|file| folder.join(file)).collect()
+    }
+
     fn problem(&self) -> Option<String> {
         let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
         let problem = self
@@ -313,4 +319,15 @@ fn refuse(problem: Option<String>, path: &Path) -> Result<()> {
 
 fn refused(problem: String, path: &Path) -> Error {
     Error::File(youla_io::Error::Settings { path: path.to_owned(), at: None, problem })
+}
+/// The texts of all keys `file`.
+fn file_names(value: &serde_json::Value) -> Vec<&str> {
+    match value {
+        serde_json::Value::Object(table) => {
+            let own = table.get("file").and_then(serde_json::Value::as_str);
+            own.into_iter().chain(table.values().flat_map(file_names)).collect()
+        }
+        serde_json::Value::Array(all) => all.iter().flat_map(file_names).collect(),
+        _ => Vec::new(),
+    }
 }

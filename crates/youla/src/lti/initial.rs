@@ -3,6 +3,7 @@
 use super::{Discrete, StateSpace, simulate};
 use crate::linalg::SequentialQr;
 use crate::{Mat, MatRef, Result};
+use faer::RowRef;
 
 /// Outputs from the initial state with `min over x0 of sum |y(k) - C A^k x0 - (response to u)(k)|^2`; y has the shape of what
 /// is simulated.
@@ -49,16 +50,17 @@ fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec
 
 /// `C A^k`, one contiguous row per output.
 struct FreeResponse {
-    /// Rows of A.
-    a: Vec<f64>,
+    /// The entries of each row of A that are not zero, by their column: a chain of delays has one a row.
+    a: Vec<Vec<(usize, f64)>>,
     rows: Vec<f64>,
     next: Vec<f64>,
 }
 
 impl FreeResponse {
     fn new(model: &StateSpace<Discrete>) -> Self {
-        let by_rows = |x: MatRef<'_, f64>| x.row_iter().flat_map(|row| row.iter().copied()).collect::<Vec<_>>();
-        FreeResponse { a: by_rows(model.a()), rows: by_rows(model.c()), next: vec![0.0; model.order()] }
+        let entries = |row: RowRef<'_, f64>| row.iter().copied().enumerate().filter(|(_, a)| *a != 0.0).collect();
+        let rows = model.c().row_iter().flat_map(|row| row.iter().copied()).collect();
+        FreeResponse { a: model.a().row_iter().map(entries).collect(), rows, next: vec![0.0; model.order()] }
     }
 
     /// NaN where an entry is not a number.
@@ -68,11 +70,10 @@ impl FreeResponse {
 
     /// From `C A^k` to `C A^(k+1)`.
     fn advance(&mut self) {
-        let n = self.next.len();
-        for row in self.rows.chunks_exact_mut(n) {
+        for row in self.rows.chunks_exact_mut(self.next.len()) {
             self.next.fill(0.0);
-            for (value, a) in row.iter().zip(self.a.chunks_exact(n)) {
-                self.next.iter_mut().zip(a).for_each(|(next, a)| *next += value * a);
+            for (value, entries) in row.iter().zip(&self.a) {
+                entries.iter().for_each(|(column, a)| self.next[*column] += value * a);
             }
             row.copy_from_slice(&self.next);
         }

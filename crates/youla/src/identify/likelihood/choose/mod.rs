@@ -11,6 +11,7 @@ mod own_noise;
 mod places;
 pub(crate) mod problem;
 pub(crate) mod resize;
+mod rivals;
 pub(crate) mod solve;
 pub(crate) mod starts;
 pub(crate) mod states;

@@ -7,7 +7,6 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::{deviance, with_best_inputs};
-use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -18,10 +17,7 @@ const REACH: usize = 12;
 const NEAR_REACH: usize = 2;
 
 /// Pole from which the search of a lag in place of a sample of dead time starts; at zero both are the same.
-const FAST: f64 = 0.1;
-
-/// Ratio of the decays of the first and the last of the poles that are tried in place of one.
-const APART: f64 = 1.5;
+pub(super) const FAST: f64 = 0.1;
 
 /// Damping ratio up to which a mode is tried as two.
 const LIGHTLY_DAMPED: f64 = 0.1;
@@ -45,31 +41,6 @@ fn halved(model: &Model, k: usize) -> Option<Model> {
     wider.blocks[k] = moved(-1.0);
     wider.blocks.push(moved(1.0));
     Some(wider)
-}
-
-/// The same model with every real pole once for each output, or for each input where these are fewer: entries of a process with lags of their
-/// own share no poles, and a pole that they share is what is left of several. The decays of the copies lie apart by a ratio. `None` where
-/// nothing would change.
-fn with_own_poles(model: &Model, ratio: f64) -> Option<Model> {
-    let (m, p) = (model.inputs, model.outputs);
-    let by_output = m == 1 || (2..=m).contains(&p);
-    let copies = if by_output { p } else { m };
-    if copies < 2 || model.blocks.iter().all(|block| block.states > 1) {
-        return None;
-    }
-    let of_real = |block: &Block| -> Vec<Block> {
-        let copy = |k: usize| {
-            let (b, c): (Vec<f64>, Vec<f64>) = if by_output {
-                (block.b.iter().map(|b| b * block.c[k]).collect(), (0..p).map(|o| f64::from(o == k)).collect())
-            } else {
-                ((0..m).map(|j| f64::from(j == k)).collect(), block.c.iter().map(|c| c * block.b[k]).collect())
-            };
-            let a = vec![block.a[0].signum() * block.a[0].abs().powf(ratio.powf(k as f64 / (copies - 1) as f64 - 0.5))];
-            Block { a, b, c, ..block.clone() }.levelled()
-        };
-        if block.states == 1 { (0..copies).map(copy).collect() } else { vec![block.clone()] }
-    };
-    Some(Model { blocks: model.blocks.iter().flat_map(of_real).collect(), ..model.clone() })
 }
 
 /// The lines for other delays.
@@ -133,22 +104,8 @@ impl Problem<'_> {
 
     /// One sample of the dead time of a single input as a fast pole: an actuator's lag is often taken for it.
     fn pole_for_delay(&self, best: &Choice, sooner: &Around) -> Option<Task> {
-        let (model, noise) = (&best.found.point.model, &best.found.noise);
-        let n = model.order();
-        if self.order.is_some() || n + 1 > self.largest_order {
-            return None;
-        }
-        let (a, b, c) = model.matrices();
-        let wide = Mat::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
-            (true, true) => a[(i, j)],
-            (true, false) => b[(i, 0)],
-            (false, true) => 0.0,
-            (false, false) => FAST,
-        });
-        let input = Mat::from_fn(n + 1, 1, |i, _| if i == n { 1.0 - FAST } else { 0.0 });
-        let output = Mat::from_fn(c.nrows(), n + 1, |i, j| if j < n { c[(i, j)] } else { model.d[i] });
-        let lagged = Model::of(wide.as_ref(), input.as_ref(), output.as_ref(), vec![0.0; c.nrows()])?;
-        let start = with_best_inputs(&sooner.spectra, lagged, noise, self.feedthrough);
+        let lagged = self.lagged(best, 0, &[FAST])?;
+        let start = with_best_inputs(&sooner.spectra, lagged, &best.found.noise, self.feedthrough);
         let origin = "a pole for a sample of dead time".into();
         Some(Task { spectra: sooner.spectra.clone(), start, delays: sooner.delays.clone(), origin })
     }
@@ -223,22 +180,6 @@ impl Problem<'_> {
         Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "two modes for one".into() })
     }
 
-    /// Real poles of its own for each output or input, those of the first the slowest and the fastest.
-    pub(super) fn apart(&self, best: &Choice) -> Vec<Task> {
-        let parts = best.found.point.model.separated().filter(|_| self.order.is_none());
-        let models = [APART, 1.0 / APART].into_iter().filter_map(|ratio| with_own_poles(parts.as_ref()?, ratio));
-        let models: Vec<Model> = models.filter(|model| model.order() <= self.largest_order).collect();
-        if models.is_empty() {
-            return Vec::new();
-        }
-        let spectra = Arc::new(self.spectra(&best.delays));
-        let task = |model: Model| {
-            let start = with_best_inputs(&spectra, model, &best.found.noise, self.feedthrough);
-            Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "poles of their own".into() }
-        };
-        models.into_iter().map(task).collect()
-    }
-
     /// Other delays, input by input: many of a single input, up to two samples away for several and on long records.
     pub(super) fn shifted(&self, delays: &[usize]) -> Vec<Vec<usize>> {
         if self.dead_time.is_some() {
@@ -257,31 +198,5 @@ impl Problem<'_> {
             }
         }
         out
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use faer::c64;
-
-    /// Poles of their own that have not moved yet are the model that they come from, by output as by input.
-    #[test]
-    fn poles_of_their_own_begin_as_the_model() {
-        let lag = |a: f64, b: &[f64], c: &[f64]| Block { states: 1, a: vec![a], b: b.to_vec(), c: c.to_vec() };
-        let wide = vec![lag(0.9, &[0.2, -0.1], &[1.0, 0.5]), lag(0.5, &[0.3, 0.4], &[-0.7, 2.0])];
-        let tall = vec![lag(0.9, &[0.2, -0.1], &[1.0, 0.5, 3.0])];
-        for (outputs, blocks, order) in [(2, wide, 4), (3, tall, 2)] {
-            let model = Model { inputs: 2, outputs, blocks, d: vec![0.0; 2 * outputs] };
-            let own = with_own_poles(&model, 1.0).unwrap();
-            assert_eq!(own.order(), order);
-            let z = c64::cis(0.3);
-            for (a, b) in own.response(z).into_iter().zip(model.response(z)) {
-                assert!((a - b).norm() < 1e-12 * b.norm(), "{a} {b}");
-            }
-            let apart = with_own_poles(&model, APART).unwrap();
-            let ratio = apart.poles()[0].norm().ln() / apart.poles()[1].norm().ln();
-            assert!((ratio * APART - 1.0).abs() < 1e-12, "{ratio}");
-        }
     }
 }

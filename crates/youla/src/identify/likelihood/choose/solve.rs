@@ -75,7 +75,7 @@ impl Problem<'_> {
         if best(&tried)?.criterion < at.criterion {
             at = here.improved(&mut tried, table)?;
         }
-        let tasks = here.apart(&at);
+        let tasks = here.rivals(&at);
         let credit = tasks.iter().map(|task| credit_of_lags(&task.start.model, samples)).fold(0.0, f64::max);
         tried.extend(here.run(tasks, at.as_rival(samples) + BESIDE + credit, table));
         if best(&tried)?.criterion < at.criterion {

@@ -144,6 +144,42 @@ impl Model {
         Model::of(a.as_ref(), b.as_ref(), c.as_ref(), self.d.clone())
     }
 
+    /// The same with an integrator beside the slowest of its real poles outside of the unit circle, on the same outputs; `None` where no such pole
+    /// is slow.
+    pub(crate) fn with_integrator_beside(&self) -> Option<Self> {
+        let mut parts = self.separated()?;
+        let outside = |block: &&Block| block.states == 1 && (LEAST_EXCESS..SLOW).contains(&(block.a[0] - 1.0));
+        let slowest = parts.blocks.iter().filter(outside).min_by(|x, y| x.a[0].total_cmp(&y.a[0]))?;
+        let integrator = Block { a: vec![1.0 - 0.1 * LEAST_EXCESS], ..slowest.clone() };
+        parts.blocks.push(integrator);
+        Some(parts)
+    }
+
+    /// The same with a lag of unit gain and of each given pole, one after the other, before an input.
+    pub(crate) fn with_lags(&self, input: usize, poles: &[f64]) -> Option<Self> {
+        let ((mut a, mut b, mut c), mut d) = (self.matrices(), self.d.clone());
+        for pole in poles {
+            let (n, m) = (a.nrows(), self.inputs);
+            let states = |i: usize, j: usize| match (i < n, j < n) {
+                (true, true) => a[(i, j)],
+                (true, false) => b[(i, input)],
+                (false, true) => 0.0,
+                (false, false) => *pole,
+            };
+            let inputs = |i: usize, j: usize| match (i < n, j == input) {
+                (true, false) => b[(i, j)],
+                (false, true) => 1.0 - pole,
+                _ => 0.0,
+            };
+            let outputs = |i: usize, j: usize| if j < n { c[(i, j)] } else { d[i * m + input] };
+            let wider = (Mat::from_fn(n + 1, n + 1, states), Mat::from_fn(n + 1, m, inputs));
+            c = Mat::from_fn(self.outputs, n + 1, outputs);
+            (0..self.outputs).for_each(|i| d[i * m + input] = 0.0);
+            (a, b) = wider;
+        }
+        Model::of(a.as_ref(), b.as_ref(), c.as_ref(), d)
+    }
+
     /// Mean square of the response in the upper half of the band.
     pub(crate) fn fast_gain(&self) -> f64 {
         let points = 32;
@@ -229,5 +265,39 @@ mod tests {
             assert!(poles.iter().any(|pole| (pole - expected).norm() < 1e-6), "{expected} in {poles:?}");
         }
         assert!(with(0.9995).is_none() && with(1.2).is_none());
+    }
+
+    /// The poles stay, and one at 1 has the outputs of the pole outside.
+    #[test]
+    fn an_integrator_stands_beside_a_pole_outside() {
+        let with = |outside: f64| {
+            let lag = |a: f64, c: [f64; 2]| Block { states: 1, a: vec![a], b: vec![1.0], c: c.to_vec() };
+            let blocks = vec![lag(outside, [2.0, -1.0]), lag(0.9, [1.0, 3.0])];
+            Model { inputs: 1, outputs: 2, blocks, d: vec![0.0; 2] }.with_integrator_beside()
+        };
+        let wider = with(1.01).unwrap();
+        let slowest = |a: &&Block| (a.a[0] - 1.0).abs() < 1e-6;
+        let integrator = wider.blocks.iter().find(slowest).unwrap();
+        assert!(wider.order() == 3 && (integrator.c[0] / integrator.c[1] + 2.0).abs() < 1e-9, "{:?}", wider.blocks);
+        assert!(with(0.99).is_none() && with(1.2).is_none());
+    }
+
+    /// Lags in series before the second input, also on its direct path.
+    #[test]
+    fn lags_are_factors_of_one_input() {
+        let (a, b) = (
+            Mat::from_fn(2, 2, |i, j| [[0.9, 0.2], [0.0, 0.5]][i][j]),
+            Mat::from_fn(2, 2, |i, j| (1 + 2 * i + j) as f64),
+        );
+        let c = Mat::from_fn(2, 2, |i, j| 1.0 - (i + 3 * j) as f64);
+        let model = Model::of(a.as_ref(), b.as_ref(), c.as_ref(), vec![0.0, 0.4, 0.3, -1.0]).unwrap();
+        let wider = model.with_lags(1, &[0.7, 0.2]).unwrap();
+        assert_eq!(wider.order(), 4);
+        let z = c64::cis(0.4);
+        let lags = (0.3 / (z - 0.7)) * (0.8 / (z - 0.2));
+        for (k, (g, before)) in wider.response(z).into_iter().zip(model.response(z)).enumerate() {
+            let expected = if k % 2 == 1 { before * lags } else { before };
+            assert!((g - expected).norm() < 1e-12 * before.norm(), "{k}: {g} {expected}");
+        }
     }
 }

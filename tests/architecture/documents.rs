@@ -78,7 +78,8 @@ fn items_that_the_documents_name_exist() {
     assert!(count > 50, "{count}");
 }
 
-fn identifiers(text: &str) -> impl Iterator<Item = &str> {
+/// The words of a text that can be names of items.
+pub(super) fn identifiers(text: &str) -> impl Iterator<Item = &str> {
     let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
     words.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_'))
 }

@@ -1,5 +1,6 @@
 //! The names of public types.
 
+use super::documents::identifiers;
 use super::files::{members, sources};
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,7 +13,7 @@ const OF_EACH_CRATE: [&str; 2] = ["Error", "Result"];
 fn declared(line: &str) -> Option<&str> {
     let item = line.trim_start().strip_prefix("pub ")?;
     let name = ["struct ", "enum ", "trait ", "type ", "union "].iter().find_map(|kind| item.strip_prefix(kind))?;
-    name.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next()
+    identifiers(name).next()
 }
 
 #[test]

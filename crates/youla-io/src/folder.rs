@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::open::{open, read_text};
+use crate::target::is_within;
 use serde::Serialize;
 use std::collections::HashSet;
 use std::fs;
@@ -105,8 +106,7 @@ impl RunFolder {
     /// # Errors
     /// [`Error::NotReplaced`].
     pub fn require_unread(&self, read: &[PathBuf]) -> Result<()> {
-        let within = |file: &&PathBuf| Some(file.canonicalize().ok()?.starts_with(self.target.canonicalize().ok()?));
-        let Some(file) = read.iter().find(|file| within(file) == Some(true)) else { return Ok(()) };
+        let Some(file) = read.iter().find(|file| is_within(file, &self.target)) else { return Ok(()) };
         let problem = format!("the run reads {} from it", file.display());
         Err(Error::NotReplaced { path: self.target.clone(), problem })
     }

@@ -27,11 +27,15 @@ pub fn require_free_for_settings(path: &Path, replace: bool, read: &[&Path]) -> 
         let kind = if there.is_dir() { "it is a folder" } else { "it is a link, a device or a pipe" };
         return refused(kind);
     }
-    let within = |file: &&Path| Some(path.canonicalize().ok()?.starts_with(file.canonicalize().ok()?));
-    if read.iter().any(|file| within(file) == Some(true)) {
+    if read.iter().any(|file| is_within(path, file)) {
         return refused("the data are read from it");
     }
     if replace { Ok(()) } else { Err(Error::FileExists { path: path.to_owned() }) }
+}
+
+/// Whether a path is a place or lies in it, links followed; false where one of the two is not there.
+pub(crate) fn is_within(path: &Path, place: &Path) -> bool {
+    matches!((path.canonicalize(), place.canonicalize()), (Ok(path), Ok(place)) if path.starts_with(&place))
 }
 
 #[cfg(test)]

@@ -104,7 +104,11 @@ impl Problem<'_> {
 
     /// One sample of the dead time of a single input as a fast pole: an actuator's lag is often taken for it.
     fn pole_for_delay(&self, best: &Choice, sooner: &Around) -> Option<Task> {
-        let lagged = self.lagged(best, 0, &[FAST])?;
+        let model = &best.found.point.model;
+        if self.order.is_some() || model.order() + 1 > self.largest_order {
+            return None;
+        }
+        let lagged = model.with_lags(0, &[FAST])?;
         let start = with_best_inputs(&sooner.spectra, lagged, &best.found.noise, self.feedthrough);
         let origin = "a pole for a sample of dead time".into();
         Some(Task { spectra: sooner.spectra.clone(), start, delays: sooner.delays.clone(), origin })

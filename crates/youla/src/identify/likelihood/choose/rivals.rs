@@ -37,63 +37,54 @@ fn with_own_poles(model: &Model, ratio: f64) -> Option<Model> {
     Some(Model { blocks: model.blocks.iter().flat_map(of_real).collect(), ..model.clone() })
 }
 
+/// The same with the poles of the first channel the slowest, and the fastest.
+fn with_poles_of_their_own(model: &Model) -> Vec<Model> {
+    let parts = model.separated();
+    [APART, 1.0 / APART].into_iter().filter_map(|ratio| with_own_poles(parts.as_ref()?, ratio)).collect()
+}
+
+/// Models with what they are.
+type Named = Vec<(Model, &'static str)>;
+
 impl Problem<'_> {
-    /// Starts of all kinds.
+    /// Starts of all kinds; none where the order is fixed.
     pub(super) fn rivals(&self, best: &Choice) -> Vec<Task> {
-        let mut tasks = self.apart(best);
-        tasks.extend(self.beside_outside(best));
-        tasks.extend(self.lags_for_delays(best));
-        tasks
-    }
-
-    /// The model with lags in series before an input, given by their poles; `None` where its order is fixed or too large.
-    pub(super) fn lagged(&self, best: &Choice, input: usize, poles: &[f64]) -> Option<Model> {
+        if self.order.is_some() {
+            return Vec::new();
+        }
         let model = &best.found.point.model;
-        let free = self.order.is_none() && model.order() + poles.len() <= self.largest_order;
-        free.then(|| model.with_lags(input, poles)).flatten()
+        let own = with_poles_of_their_own(model).into_iter().map(|model| (model, "poles of their own"));
+        let integrator = model.with_integrator_beside().map(|model| (model, "an integrator beside a pole outside"));
+        let here = (best.delays.clone(), own.chain(integrator).collect());
+        let groups = std::iter::once(here).chain(self.lags_for_delays(best));
+        groups.flat_map(|(delays, models)| self.starts_of(best, &delays, models)).collect()
     }
 
-    /// Real poles of its own for each output or input, those of the first the slowest and the fastest.
-    fn apart(&self, best: &Choice) -> Vec<Task> {
-        let parts = best.found.point.model.separated().filter(|_| self.order.is_none());
-        let models = [APART, 1.0 / APART].into_iter().filter_map(|ratio| with_own_poles(parts.as_ref()?, ratio));
-        let models: Vec<Model> = models.filter(|model| model.order() <= self.largest_order).collect();
+    /// The models with their best inputs, as far as their order is allowed.
+    fn starts_of(&self, best: &Choice, delays: &[usize], mut models: Named) -> Vec<Task> {
+        models.retain(|(model, _)| model.order() <= self.largest_order);
         if models.is_empty() {
             return Vec::new();
         }
-        let spectra = Arc::new(self.spectra(&best.delays));
-        let task = |model: Model| {
+        let spectra = Arc::new(self.spectra(delays));
+        let task = |(model, origin): (Model, &str)| {
             let start = with_best_inputs(&spectra, model, &best.found.noise, self.feedthrough);
-            Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "poles of their own".into() }
+            Task { spectra: spectra.clone(), start, delays: delays.to_vec(), origin: origin.into() }
         };
         models.into_iter().map(task).collect()
     }
 
-    /// An integrator beside a slow pole outside of the unit circle: where the feedback holds the output, an integrator and a slow lag look like one
-    /// such pole, and Schwarz's criterion takes it.
-    fn beside_outside(&self, best: &Choice) -> Option<Task> {
-        let model = best.found.point.model.with_integrator_beside().filter(|_| self.order.is_none())?;
-        let spectra = Arc::new(self.spectra(&best.delays));
-        let start = with_best_inputs(&spectra, model, &best.found.noise, self.feedthrough);
-        Some(Task { spectra, start, delays: best.delays.clone(), origin: "an integrator beside a pole outside".into() })
-    }
-
-    /// One lag, and two, in place of the whole dead time of an input: several lags that are hardly told apart look like one dead time.
-    fn lags_for_delays(&self, best: &Choice) -> Vec<Task> {
+    /// One lag, and two, in place of the whole dead time of an input: several lags that are hardly distinguished look like one dead time.
+    fn lags_for_delays(&self, best: &Choice) -> Vec<(Vec<usize>, Named)> {
         let of_input = |j: usize| {
             let (d, mut delays) = (best.delays[j] as f64, best.delays.clone());
             delays[j] = 0;
-            let spectra = Arc::new(self.spectra(&delays));
             let lags = [vec![1.0 - 1.0 / d], vec![(1.0 - 2.0 / d).max(FAST); 2]];
-            let models = lags.iter().filter_map(|lags| self.lagged(best, j, lags)).collect::<Vec<_>>();
-            let task = |model: Model| {
-                let start = with_best_inputs(&spectra, model, &best.found.noise, self.feedthrough);
-                Task { spectra: spectra.clone(), start, delays: delays.clone(), origin: "lags for a dead time".into() }
-            };
-            models.into_iter().map(task).collect::<Vec<_>>()
+            let models = lags.iter().filter_map(|lags| best.found.point.model.with_lags(j, lags));
+            (delays, models.map(|model| (model, "lags for a dead time")).collect())
         };
         let free = self.dead_time.is_none();
-        (0..best.delays.len()).filter(|j| free && best.delays[*j] > 1).flat_map(of_input).collect()
+        (0..best.delays.len()).filter(|j| free && best.delays[*j] > 1).map(of_input).collect()
     }
 }
 

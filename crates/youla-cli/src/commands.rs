@@ -4,7 +4,9 @@ use crate::args::{Args, Command};
 use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, commission, compare, excite, export, init, paper, plot, rig, synchronise, table, workbench};
+use crate::{
+    check, commission, compare, excite, export, init, interrupt, paper, plot, rig, synchronise, table, workbench,
+};
 use std::path::{Path, PathBuf};
 use youla_io::folder::RunFolder;
 use youla_io::require_free;
@@ -70,13 +72,16 @@ fn identify_and_write(
     };
     place.require_unread(&settings.files(folder))?;
     let progress = Progress::new(form.is_silent());
+    let reached = interrupt::without_result(place.unfinished());
     let mut announce = |stage: Stage| {
+        interrupt::note(&reached, Some(stage));
         progress.show(&format!("[{}/{}] {}", stage as usize + 1, Stage::COUNT, stage.name()));
     };
     let mut clock = StageClock::new(&mut announce);
     let records = clock.run(Stage::Record, || read(&settings))?;
     let found = identify(settings, records, folder, &mut clock)?;
     let written = write_into(&found, place, &mut clock)?;
+    interrupt::note(&reached, None);
     progress.clear();
     form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))?;
     found.redesign_reservation().map_or(Ok(()), |why| Err(Failure::Refused(why, youla::ErrorKind::Numerical)))

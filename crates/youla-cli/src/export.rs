@@ -25,7 +25,7 @@ pub(crate) struct ExportArgs {
     source: PathBuf,
     /// mat, json, npz, python, matlab, c (C99 header of the model), c-controller (C99 header of the controller of a run with the
     /// ports alpha and beta) or c-loop (C99 header of the whole loop of a firmware: guard, excitation, exchangeable Q); of a new PID st (IEC
-    /// 61131-3 structured text), c-pid (C99 header) or gains (parallel, ideal, series, MATLAB, Simulink).
+    /// 61131-3 structured text), c-pid (C99 header), gains (parallel, ideal, series, MATLAB, Simulink), betaflight, px4, ardupilot or odrive.
     #[arg(long, value_name = "FORMAT", value_parser = format)]
     to: Format,
     /// Model of the run: recommended by default, or hansen, hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller,

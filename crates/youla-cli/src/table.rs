@@ -42,7 +42,8 @@ fn new_gains(controllers: &[PidController], folder: &str) -> String {
         let _ = write!(text, "\nnew PID{of_loop}: kp {kp}, ki {ki} 1/s, kd {kd} s, derivative_filter {filter} s");
         notches.iter().for_each(|notch| text += &format!(", notch at {} Hz", figure(notch.hz)));
     }
-    text + &format!("\n  youla export {folder} --to gains, c-pid or st writes it")
+    let of_loop = if controllers.len() > 1 { ", with --loop N," } else { "" };
+    text + &format!("\n  youla export {folder} --to gains, c-pid or st{of_loop} writes it")
 }
 
 /// Table 1, what became of the paper's claims, and where everything is.

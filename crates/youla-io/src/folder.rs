@@ -101,6 +101,11 @@ impl RunFolder {
         Err(Error::OutputExists { path: runs })
     }
 
+    /// Where the files are until the folder is finished.
+    pub fn unfinished(&self) -> &Path {
+        &self.partial
+    }
+
     /// Refuses to replace an older run from which a file is `read`: what it was made from would be lost.
     ///
     /// # Errors

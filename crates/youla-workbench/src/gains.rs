@@ -48,6 +48,19 @@ struct Kept {
     drawn: usize,
     /// Those of them under which the controller that ran is stable: the log contradicts the others.
     draws: Vec<SystemMatrices>,
+    /// Highest frequency of a band of validity, Hz; 0 where there is none.
+    valid_to: f64,
+}
+
+/// `|I - S|` beyond the bands of validity from which it is said: of a response of which nothing is known there, twice as much makes the loop unstable.
+const LITTLE_GAIN: f64 = 0.5;
+
+/// The highest frequency of the bands of validity that a run folder states, Hz.
+fn valid_to(run: &Path) -> Result<f64> {
+    let summary: Value = serde_json::from_str(&read_text(&run.join("summary.json"))?)?;
+    let rows = summary["recommended"]["entry_bands"].as_array().into_iter().flatten();
+    let bands = rows.filter_map(Value::as_array).flatten().filter_map(Value::as_array).flatten();
+    Ok(bands.filter_map(|band| band[1].as_f64()).fold(0.0, f64::max))
 }
 
 fn file_of(run: &Path) -> PathBuf {
@@ -72,6 +85,7 @@ pub(crate) fn keep(run: &Path) -> Result<Value> {
         outputs: names(recommended.outputs),
         running: controller.matrices,
         drawn: drawn.len(),
+        valid_to: valid_to(run)?,
         draws: drawn.into_iter().map(|draw| draw.plant).filter(possible).map(|p| SystemMatrices::new(&p)).collect(),
     };
     let path = file_of(run);
@@ -98,11 +112,15 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
         unstable += usize::from(!looped.is_stable()?);
     }
     let stable = centre.is_stable()?;
+    let omega = grid(&plant, time)?;
+    let (m, p) = (plant.inputs(), plant.outputs());
     let mut answer = json!({
         "stable": stable, "drawn": kept.drawn, "draws": draws.len(), "unstable": unstable, "inputs": kept.inputs, "outputs": kept.outputs,
         "worst_pole": centre.worst_pole()?.map_or(0.0, |pole| pole.norm()),
     });
-    let omega = grid(&plant, time)?;
+    if let Some([hz, gain]) = beyond(&centre, (m, p), &omega, kept.valid_to)? {
+        answer["beyond"] = json!({ "valid_to": kept.valid_to, "hz": hz, "gain": gain });
+    }
     answer["hz"] = json!(omega.iter().map(|w| w / TAU).collect::<Vec<_>>());
     if (plant.inputs(), plant.outputs()) == (1, 1) {
         answer["locus"] = json!(locus(&plant, &k, &omega)?);
@@ -113,7 +131,6 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     if !stable || unstable > 0 {
         return Ok(answer);
     }
-    let (m, p) = (plant.inputs(), plant.outputs());
     let all: Vec<Vec<f64>> = std::iter::once(&centre)
         .chain(&loops)
         .map(|looped| Ok(largest(&frequency_response(&looped.part(m..m + p, m..m + p), &omega)?)))
@@ -134,6 +151,20 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     let peak = |s: &Vec<f64>| s.iter().fold(0.0_f64, |a, b| a.max(*b));
     answer["worst_sensitivity"] = json!(all.iter().map(peak).fold(0.0, f64::max));
     Ok(answer)
+}
+
+/// Frequency and size of the largest `|I - S|` beyond the bands of validity; `None` where it is small.
+fn beyond(
+    looped: &StateSpace<Discrete>,
+    (m, p): (usize, usize),
+    omega: &[f64],
+    valid_to: f64,
+) -> Result<Option<[f64; 2]>> {
+    let above: Vec<f64> = omega.iter().copied().filter(|w| *w > TAU * valid_to).collect();
+    let s = frequency_response(&looped.part(m..m + p, m..m + p), &above)?;
+    let of = |s: faer::MatRef<'_, c64>| (s - Mat::<c64>::identity(p, p)).norm_l2();
+    let largest = s.iter().map(of).zip(&above).max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(largest.filter(|(gain, _)| *gain > LITTLE_GAIN).map(|(gain, w)| [w / TAU, gain]))
 }
 
 /// Lines of the figures, dense at light resonances, rad/s.

@@ -10,7 +10,9 @@
     event.preventDefault();
     document.body.classList.remove("dragging");
     const entries = [...(event.dataTransfer?.items ?? [])].map(item => item.webkitGetAsEntry?.()).filter(entry => entry?.isDirectory);
-    if (entries.length) for (const entry of entries) { await folder(/** @type {any} */ (entry), entry?.name ?? ""); runs.dropped(entry?.name ?? ""); }
+    // Some browsers show the folders that are dropped on a page from the disk, and keep the files in them from it.
+    const kept = (/** @type {any} */ error) => { by("log-status").textContent = `The browser does not hand over the files of a folder dropped on a page from the disk (${error?.name}): open it by "open a run folder".`; };
+    if (entries.length) for (const entry of entries) await folder(/** @type {any} */ (entry), entry?.name ?? "").then(() => runs.dropped(entry?.name ?? ""), kept);
     else log.opened(event.dataTransfer?.files ?? []);
   });
   by("open-file").addEventListener("change", event => { log.opened([...event.target.files]); });

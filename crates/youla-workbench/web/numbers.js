@@ -17,11 +17,13 @@ function numbersOf(text) {
 /** A heading without the unit in brackets behind it. @param {string} heading */
 const withoutUnit = heading => heading.replace(/\s*[[(][^\])]*[\])]\s*$/, "");
 
-/** Says beside a field what it takes; nothing where it is right. @param {HTMLInputElement} input @param {string | false} what */
+/** Says beside a field what it takes, and that the value before still counts; nothing where it is right.
+ * @param {HTMLInputElement} input @param {string | false} what */
 function complain(input, what) {
   input.setAttribute("aria-invalid", String(!!what));
   input.setCustomValidity(what || "");
-  if (what) input.reportValidity();
+  input.parentElement?.querySelector(".wrong")?.remove();
+  if (what) input.after(element("em", { class: "wrong", role: "alert" }, `${what}. Until then the value before counts.`));
 }
 
 /** Gains of the loops as one types them. @param {number | number[] | null | undefined} value */

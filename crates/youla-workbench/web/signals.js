@@ -115,7 +115,7 @@ const signals = (() => {
     clearTimeout(checking);
     const timer = checking = window.setTimeout(async () => {
       const { data, controller } = settings.table;
-      if (!data.inputs.length || !data.outputs.length || !log.sampleTime()) return told([], null);
+      if (!data.inputs.length || !data.outputs.length || !log.sampleTime()) return told([], null, false);
       const needed = controller ? neededBy(controller) : [], whole = controller && !needed.length;
       // What can be said before a controller is described is said: as of an open loop, without the tests of the controller.
       const asked = whole ? settings.text : (await engine.ask({ verb: "toml", table: { ...settings.table, controller: openLoop(data) } })).toml;
@@ -130,13 +130,13 @@ const signals = (() => {
     }, 350);
   }
 
-  /** @param {any[]} found @param {any} controller */
-  function told(found, controller) {
+  /** @param {any[]} found @param {any} controller @param {boolean} ran */
+  function told(found, controller, ran = true) {
     findings = found;
     plots.forEach(u => u.redraw(false));
     const line = f => element("li", {}, element("span", { class: `status ${{ defect: "bad", caution: "caution" }[f.severity] ?? ""}`, "aria-hidden": "true" }, { defect: "!", caution: "!" }[f.severity] ?? "i"), element("span", {}, `${f.severity[0].toUpperCase()}${f.severity.slice(1)}: ${f.sentence}`));
     const serious = found.filter(f => f.severity !== "note"), notes = found.filter(f => f.severity === "note");
-    listed.replaceChildren(element("ul", { class: "notes plain" }, ...(serious.length ? serious.map(line) : [element("li", {}, settings.table.data.inputs.length ? "The check found no defect." : "")])),
+    listed.replaceChildren(element("ul", { class: "notes plain" }, ...(serious.length ? serious.map(line) : [element("li", {}, ran ? "The check found no defect." : settings.table.data.inputs.length ? "Not checked yet: the check needs an input, an output and the sample time." : "")])),
       ...(notes.length ? [element("details", { open: listed.querySelector("details")?.open ? "" : null }, element("summary", {}, `${notes.length} notes`), element("ul", { class: "notes plain" }, ...notes.map(line)))] : []));
     const sentence = (/** @type {any} */ f) => `Defect: ${f.sentence}`, defects = found.filter(f => f.severity === "defect" && f.test), ofController = defects.find(f => f.test === "controller" || f.test === "feedback");
     saidOfController.textContent = ofController ? sentence(ofController) : controller ? `${controller.sentence}.` : "";

@@ -97,6 +97,30 @@ impl Firmware {
         }
     }
 
+    /// Least and largest gain in the descriptions of its parameters, which ground stations show and the firmware does not enforce: PX4 1.14
+    /// (`mc_rate_control_params.c`), ArduCopter 4.5 (`AC_AttitudeControl_Multi.cpp`).
+    fn described(self) -> Option<[[f64; 2]; 3]> {
+        match self {
+            Firmware::Px4 => Some([[0.01, 0.5], [0.0, f64::INFINITY], [0.0, 0.01]]),
+            Firmware::ArduPilot => Some([[0.01, 0.5], [0.01, 2.0], [0.0, 0.05]]),
+            Firmware::Betaflight | Firmware::Odrive => None,
+        }
+    }
+
+    /// What its descriptions say of gains beyond their ranges.
+    fn beyond(self, gains: [f64; 3]) -> Vec<String> {
+        let all = ["P", "I", "D"].into_iter().zip(gains).zip(self.described().into_iter().flatten());
+        let beyond = all.filter(|((_, gain), [least, most])| *gain != 0.0 && !(*least..=*most).contains(gain));
+        let word = |((name, gain), [least, most]): ((&str, f64), [f64; 2])| {
+            let range = if most.is_finite() { format!("{least} to {most}") } else { format!("from {least}") };
+            format!(
+                "# caution: {name} is {}, its description says {range}: check the units of y and u before it is flown",
+                number(gain)
+            )
+        };
+        beyond.map(word).collect()
+    }
+
     /// Why it cannot hold these gains.
     fn problem(self, pid: &PidExport) -> Option<String> {
         let gains = [("kp", pid.kp), ("ki", pid.ki), ("kd", pid.kd)];
@@ -121,9 +145,13 @@ impl Firmware {
         let over = gains.into_iter().zip(scales).find(|((_, gain), scale)| gain / scale > largest);
         let ((name, gain), scale) = over.filter(|_| self == Firmware::Betaflight)?;
         let asked = number((gain / scale).round());
-        Some(format!(
-            "{name} is {asked} in {key}, at most {largest} are taken; log y in deg/s and u as axisP + axisI + axisD"
-        ))
+        let remedy = match unit.is_empty() {
+            true => "log y in deg/s and u as axisP + axisI + axisD, and state the unit of y in [data]",
+            false => {
+                "a lower peak_sensitivity or a larger phase margin in [redesign.pid] gives smaller gains; u must be axisP + axisI + axisD"
+            }
+        };
+        Some(format!("{name} is {asked} in {key}, at most {largest} are taken; {remedy}"))
     }
 }
 
@@ -146,7 +174,9 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     if firmware != Firmware::Odrive {
         text.push_str("# of the roll axis; write pitch or yaw for another\n");
     }
-    let mut lines = firmware.gains([pid.kp, pid.ki, pid.kd]);
+    let gains = [pid.kp, pid.ki, pid.kd];
+    let mut lines = firmware.beyond(gains);
+    lines.extend(firmware.gains(gains));
     if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
         lines.extend(firmware.filter(0.5 / (std::f64::consts::PI * pid.derivative_filter)));
     }

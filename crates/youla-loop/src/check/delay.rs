@@ -222,7 +222,9 @@ impl Delay {
                     Some(0) => {
                         "Use feedthrough = \"estimated\", or check whether the output is logged one sample late or the input early"
                     }
-                    _ => "Declare `delays` if this is dead time; then the model needs no states for it",
+                    _ => {
+                        "State it as `dead_time` in [recommended] if it is known; then the model needs no states for it"
+                    }
                 };
                 let finding = Finding::new(Test::Delay, Severity::Note, record, what).channel(&output.name);
                 all.push(finding.number("lag", first.unwrap_or(0) as f64).advice(advice));

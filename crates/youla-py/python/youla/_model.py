@@ -318,6 +318,16 @@ class Model:
         dead_time = f" and dead time {list(self.dead_time)}" if any(self.dead_time) else ""
         return f"<youla.Model {self.name!r}: order {self.order}{dead_time}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
 
+    def __eq__(self, other: object) -> bool:
+        """Whether another model has the same matrices, bit by bit, sample time, names and dead time."""
+        if not isinstance(other, Model):
+            return NotImplemented
+        own, its = ((m._dt, m.inputs, m.outputs, m.name, m._dead_time) for m in (self, other))
+        return own == its and all(np.array_equal(a, b) for a, b in zip(self._matrices, other._matrices, strict=True))
+
+    def __hash__(self) -> int:
+        return hash((self._dt, self.inputs, self.outputs, self.name))
+
     def __reduce__(self) -> Any:
         return _model_of, (self._matrices, self._dt, self.inputs, self.outputs, self.name, self._dead_time)
 

@@ -140,7 +140,9 @@ def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | Non
         refuse_masked(values, f"channel {name!r}")
         if name != time:
             refuse_wrapped(values, f"channel {name!r}")
-    arrays = {name: as_floats(values, f"channel {name!r}") for name, values in columns.items()}
+    arrays = {name: as_floats(_seconds(values) if name == time else values, f"channel {name!r}") for name, values in columns.items()}
+    # A matrix of one column is a channel, as simulations return it.
+    arrays = {name: array[:, 0] if array.ndim == 2 and array.shape[1] == 1 else array for name, array in arrays.items()}
     for name, array in arrays.items():
         if array.ndim != 1:
             raise InputError(f"channel {name!r} has {array.ndim} dimensions, but a column has 1; give one entry per channel")
@@ -152,6 +154,14 @@ def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | Non
         raise InputError("inputs and outputs are missing: name the channels of data")
     names = list(arrays)
     return Source(np.column_stack(list(arrays.values())), _clock(times, dt, f"time {time!r}", time), names, [""] * len(names))
+
+
+def _seconds(times: Any) -> Any:
+    """Dates and durations as seconds from the first; numbers as they are."""
+    dtype = getattr(times, "dtype", None)
+    if getattr(dtype, "kind", "") not in "mM" or len(times) == 0:
+        return times
+    return (times - times[0]) / np.timedelta64(1, "s")
 
 
 def _needed(known: list[Any], chosen: dict[str, list[str | int]], time: str | int | None) -> list[str]:

@@ -113,8 +113,15 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
         let times = record.column(TIME)?.to_vec();
         let Some(found) = timing(&times, job.time.ts, job.time.tolerance) else {
             let what = file.file.display().to_string();
-            job.time.of_column(&what, &times)?;
-            return Err(Error::File(youla_io::Error::SampleTimeMissing { what }));
+            if times.len() > 1 {
+                job.time.of_column(&what, &times)?;
+            }
+            let problem = format!(
+                "rows {first} to {} between two gaps of the time are too few to tell the sample time by: the steps of the time are irregular. \
+                 `youla synchronise` brings the channels to one clock; sample_time in [data] states it where the time is only logged unsteadily",
+                first + times.len() - 1
+            );
+            return Err(Error::File(youla_io::Error::Clock { what, problem }));
         };
         findings = found.findings(&part.name, first);
         time = Discrete::new(job.time.ts.filter(|_| found.unit.is_none()).unwrap_or(found.step))?;

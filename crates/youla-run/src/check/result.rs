@@ -31,13 +31,15 @@ impl DataCheck {
         self.findings.iter().filter(|f| f.severity == severity).count()
     }
 
-    /// Findings of the same test, severity and channel in several records as one: the first of them, with the number of further
+    /// Findings of the same test, severity, channel and cause in several records as one: the first of them, with the number of further
     /// records. In the order of the findings; two findings of one record are never one.
     pub(crate) fn grouped(&self) -> Vec<(&Finding, usize)> {
         let mut groups: Vec<Vec<&Finding>> = Vec::new();
         for finding in &self.findings {
-            fn kind(f: &Finding) -> (Test, Severity, Option<&str>) {
-                (f.test, f.severity, f.channel.as_deref())
+            // The names of the numbers say what mends the log.
+            fn kind(f: &Finding) -> (Test, Severity, Option<&str>, Vec<&String>) {
+                let causes = f.numbers.keys().filter(|_| f.test == Test::Controller && f.severity > Severity::Note);
+                (f.test, f.severity, f.channel.as_deref(), causes.collect())
             }
             let joins = |group: &&mut Vec<&Finding>| {
                 kind(group[0]) == kind(finding) && group.iter().all(|known| known.record != finding.record)

@@ -138,7 +138,8 @@ pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
 fn new_pid(run: &Path) -> Result<PidEntry> {
     let path = run.join("8-redesign/pid.json");
     if !path.is_file() {
-        let problem = "this run has no new PID; add structure = \"pid\" to [redesign] and run `youla identify` again";
+        let problem = "8-redesign/pid.json is not there: this run has no new PID, or the file was removed; with structure = \"pid\" in [redesign] \
+                       `youla identify` writes it";
         return Err(not(run, problem));
     }
     let text = youla_io::read_text(&path)?;

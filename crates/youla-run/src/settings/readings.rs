@@ -3,6 +3,7 @@
 use super::controller::{ControllerSettings, Hold};
 use super::models::Polynomials;
 use super::pid::{IdealPid, LoopGain, ParallelPid};
+use std::f64::consts::TAU;
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
 use youla_loop::check::{GainPart, Reading};
@@ -97,7 +98,10 @@ impl ControllerSettings {
                 if let LoopGain::One(filter) = pid.derivative_filter
                     && filter > 0.0
                 {
-                    all.extend([1e-3 * filter, 1e3 * filter, 1.0 / filter].map(|filter| {
+                    // Milliseconds, a cutoff in rad/s or in Hz for its time constant, and one over it without 2 pi.
+                    let others =
+                        [1e-3 * filter, 1e3 * filter, 1.0 / filter, 1.0 / (TAU * filter), filter / TAU, filter * TAU];
+                    all.extend(others.map(|filter| {
                         let derivative_filter = LoopGain::One(filter);
                         let words = format!("derivative_filter = {filter}");
                         (words, Self::Pid(ParallelPid { derivative_filter, ..pid.clone() }))

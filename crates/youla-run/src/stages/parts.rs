@@ -42,7 +42,7 @@ pub fn redesign_kept(
     design(records, (plant, model), &factors, region, options)
 }
 
-/// One PID for the plants and regions of runs that were kept, as `[redesign] structure = "pid"` with these options gives it for one; settings
+/// One PID for the plants and regions of runs that were kept, `trusted` where all their models are, as `[redesign] structure = "pid"` with these options gives it for one; settings
 /// and records are those of the first run, whose controller ran at all points.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ pub fn redesign_kept(
 pub fn pid_kept(
     settings: &RunSettings,
     records: &RunRecords,
-    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    points: (Vec<(&StateSpace<Discrete>, &Region)>, bool),
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let declared = declared_loop(settings, records, Path::new("."))?;

@@ -33,7 +33,7 @@ pub(crate) fn redesigned(
 pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<Result<PidRedesign>> {
     let options = run.settings.redesign.as_ref()?;
     options.structure?;
-    Some(pid_of(run, vec![(&recommended.plant, &recommended.region)], options))
+    Some(pid_of(run, (vec![(&recommended.plant, &recommended.region)], recommended.trusted()), options))
 }
 
 /// One PID for plants and their regions at which the controller of a run ran.
@@ -42,11 +42,11 @@ pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<R
 /// As [`design_pid`].
 pub(crate) fn pid_of(
     run: RunContext<'_>,
-    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    (points, trusted): (Vec<(&StateSpace<Discrete>, &Region)>, bool),
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let (running, delay) = (run.declared.controller(), run.settings.controller.delay());
-    let found = design_pid(&PidProblem { points, running, delay }, &options.pid, &options.band);
+    let found = design_pid(&PidProblem { points, running, delay, trusted }, &options.pid, &options.band);
     found.map_err(|e| Error::from(e).within("[redesign]"))
 }
 

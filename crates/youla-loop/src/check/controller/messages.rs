@@ -134,13 +134,17 @@ impl ControllerCheck {
                 Severity::Defect,
                 "the declared controller is not the one that ran: by itself it is unstable".to_owned(),
             ),
-            (None, false) => (
-                Severity::Note,
-                format!(
-                    "the declared controller does not explain {percent} % of the logged input: an excitation is not declared, \
+            (None, false) => {
+                // What a declared reference leaves is a description that is not whole; without one the loop was moved by something else.
+                let severe = self.guided && self.residual > options.controller_defect;
+                let severity = if severe { Severity::Caution } else { Severity::Note };
+                let path = if self.guided { "the reference enters by another path, " } else { "" };
+                let what = format!(
+                    "the declared controller does not explain {percent} % of the logged input: {path}an excitation is not declared, \
                      or the controller differs"
-                ),
-            ),
+                );
+                (severity, what)
+            }
             _ => {
                 let severe = self.residual > options.controller_defect;
                 let severity = if severe { Severity::Defect } else { Severity::Caution };

@@ -55,6 +55,8 @@ pub struct PidProblem<'a> {
     pub running: &'a StateSpace<Discrete>,
     /// Dead time in whole samples that the machine adds to its controller; it is in `running` too.
     pub delay: usize,
+    /// Whether the verdict trusts every model.
+    pub trusted: bool,
 }
 
 /// A PID, or one for each loop, with its proof.
@@ -76,6 +78,8 @@ pub struct PidRedesign {
     pub proof: PidProof,
     /// The way to the new controller.
     pub steps: Vec<PlannedStep>,
+    /// Whether the verdict trusts the models on which all this rests.
+    pub trusted: bool,
 }
 
 impl PidRedesign {
@@ -83,6 +87,9 @@ impl PidRedesign {
     pub fn reservations(&self) -> Vec<String> {
         let p = &self.proof;
         let mut reasons = Vec::new();
+        if !self.trusted {
+            reasons.push("the model is not trusted, and what is proved on its region may not hold".to_owned());
+        }
         if !p.holds() {
             reasons.push(format!(
                 "of {} fresh models of the region {} are unstable and {} miss a limit",
@@ -112,7 +119,7 @@ impl PidRedesign {
 /// [`youla::Error::NotStabilising`] where the running controller does not stabilise the plant.
 pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
     options.check()?;
-    let PidProblem { points, running, delay } = problem;
+    let PidProblem { points, running, delay, trusted } = problem;
     let (running, delay) = (*running, *delay);
     if let Some((what, instead)) = unsupported(problem)? {
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
@@ -169,6 +176,7 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         options: options.clone(),
         controllers,
         system,
+        trusted: *trusted,
     })
 }
 

@@ -191,7 +191,7 @@ fn identified_under(
 fn what_is_promised_holds_on_the_machine() {
     let model = identified(8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
     let options = PidOptions { notches: 1, command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -223,7 +223,8 @@ fn one_controller_serves_several_operating_points() {
     let both = vec![(&first.plant, &first.region), (&second.plant, &second.region)];
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
-    let of = |points| design_pid(&PidProblem { points, running: &k, delay: 0 }, &options, &band).unwrap();
+    let of =
+        |points| design_pid(&PidProblem { points, running: &k, delay: 0, trusted: true }, &options, &band).unwrap();
     let new = of(both);
     assert!(new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
     for brake in [8.0, 1.0] {
@@ -242,7 +243,7 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
     let plant = pair(0.3);
     let k = whole(&[running(), running()], time()).unwrap();
     let model = identified_under(&plant, &k, vec![1, 1], 8);
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let new = design_pid(&problem, &options, &band).unwrap();
@@ -263,7 +264,7 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
 fn a_refusal_names_the_limit() {
     let model = identified(-8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
     let band = BandOptions { draws: 30, seed: 1 };
     let refusal = |options: PidOptions| design_pid(&problem, &options, &band).err().unwrap().to_string();
     let late = refusal(PidOptions { delay_margin: 1.0, ..PidOptions::default() });

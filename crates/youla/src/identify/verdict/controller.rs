@@ -9,7 +9,8 @@
 //! `|dF T (I - F T)^-1|` with `s = T u` in the loop: a wrong gain or delay where the loop gain is small harms nobody.
 
 use super::limits::{AS_STATED, AT_LIMIT, LARGEST_CONTROLLER_ERROR, LARGEST_INPUTS, NEARLY_EXACT};
-use super::local_error::{Channels, LocalErrors, RecordLines, band_count, hann};
+use super::local_error::{Channels, LocalErrors, RecordLines, hann};
+use super::partition::Partition;
 use crate::identify::likelihood::data::spectra::lines_of;
 use crate::identify::likelihood::{Evidence, LoopKnowledge, LoopSignals};
 use crate::linalg::{RiccatiProblem, TINY, dare};
@@ -65,7 +66,7 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
     let q = all.iter().filter_map(|r| r.excitation).map(|x| x.ncols()).max().unwrap_or(0);
     let channels = Channels { m: if observer { plant.inputs() } else { law.inputs() }, p: law.outputs(), q };
     let total: usize = records.iter().map(|r| r.v.len() / channels.p.max(1)).sum();
-    let excess = LocalErrors::new(&records, channels, band_count(total, channels), 0).excess();
+    let excess = LocalErrors::new(&records, channels, &Partition::equal(total, channels), 0).excess();
     if excess.is_empty() && share < AS_STATED {
         let note = format!(
             "the law leaves {:.2} % of the inputs, and the excitation moves too little of them to say more",
@@ -80,7 +81,10 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
             "the excitation does not reach everything that the controller sees",
         )));
     }
-    let worst = worst(law, &gain, plant, |share| excess.near(share, channels.m * channels.p))?;
+    let Ok(worst) = worst(law, &gain, plant, |share| excess.near(share, channels.m * channels.p)) else {
+        let why = "the stated controller or its filter has no finite response at a frequency that is judged";
+        return Ok(Some(Evidence::untested(QUESTION, LARGEST_CONTROLLER_ERROR, why)));
+    };
     let note = format!("the law leaves {:.2} % of the inputs{}", 100.0 * share, left_out(&residuals, &all));
     let [figure, hz, significance] = worst;
     let evidence = Evidence::new(QUESTION, figure, LARGEST_CONTROLLER_ERROR).noted(note).at([hz, hz]);

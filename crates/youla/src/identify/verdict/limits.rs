@@ -3,6 +3,12 @@
 /// Lines of a band for each channel of the excitation. Enough for the power of the noise within 16 % (`1 / sqrt(40)`); a band of 40 lines of a
 /// record of 12 000 samples is 0.3 % of the sample rate wide.
 pub(crate) const BAND_LINES: usize = 40;
+/// Least lines of a band for each channel of the excitation, at low frequency: four that count, of which three are left to tell the noise by.
+pub(crate) const LEAST_BAND_LINES: usize = 8;
+/// Width of a band over its frequency, between these limits: half of the window over which bands are averaged.
+pub(crate) const BAND_SHARE: f64 = 0.12;
+/// Least lines of a band in each of several records: a line under a Hann window holds three.
+pub(crate) const LEAST_OF_RECORD: usize = 3;
 /// Lines under a Hann window that count as one: `sum of |correlation|^2 = 1 + 2 (2/3)^2 + 2 (1/6)^2`.
 pub(crate) const HANN_LOSS: f64 = 35.0 / 18.0;
 /// Directions of the excitation with less than this share of its mean power per band are left out: rounding of a log of five digits. A move of
@@ -57,7 +63,8 @@ pub(crate) const NEARLY_EXACT: f64 = 1e-4;
 pub(crate) const LARGEST_INPUTS: f64 = 0.1;
 /// An input is at a limit where its extreme value occurs at least so often, and in at most one of so many samples.
 pub(crate) const AT_LIMIT: (usize, usize) = (3, 2);
-/// Largest relative deviation of the difference of two parts of the records where they are compared.
+/// Largest relative deviation of the difference of two parts of the records where they are compared, and of the response as the excitation alone
+/// shows it at the ends of a band of validity. Chosen.
 pub(crate) const KNOWN: f64 = 0.3;
 /// What the squares of the deviations of a model are multiplied with that leaves a mode to the noise at a frequency that the excitation shows: no
 /// autoregression is as narrow. Of three axes with cogging the errors were up to 3.5 deviations.

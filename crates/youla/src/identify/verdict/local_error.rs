@@ -11,9 +11,10 @@
 
 use super::excess::{Excess, ExcessBand};
 use super::limits::{
-    BAND_LINES, HANN_LOSS, LEAST_COMPARED, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE,
-    WEAK_EXCITATION,
+    BAND_LINES, BAND_RATIO, HANN_LOSS, KNOWN, LEAST_COMPARED, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED,
+    LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION,
 };
+use super::partition::Partition;
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, MatRef, Side, c64};
@@ -67,31 +68,37 @@ pub(crate) struct Band {
 #[derive(Debug, Clone)]
 pub(crate) struct LocalErrors {
     pub(crate) bands: Vec<Option<Band>>,
+    /// Where they are.
+    pub(crate) partition: Partition,
     /// By how many standard deviations the errors of all bands exceed chance; `None` where the bands have no more degrees of
     /// freedom than the model has parameters.
     pub(crate) significance: Option<f64>,
 }
 
-/// Bands for so many lines.
-pub(crate) fn band_count(lines: usize, channels: Channels) -> usize {
-    (lines / (BAND_LINES * channels.q.max(1))).max(1)
-}
-
 impl LocalErrors {
-    /// In `count` bands of equal width; `parameters` of the model were fitted to the same records.
-    pub(crate) fn new(records: &[RecordLines<'_>], channels: Channels, count: usize, parameters: usize) -> Self {
-        let sums = sums(records, channels, count);
-        let power = |s: &Sums| (0..channels.q).map(|i| s.xx[(i, i)].re).sum::<f64>();
-        let least = WEAK_EXCITATION * sums.iter().map(power).sum::<f64>() / count as f64;
-        let (mut statistic, mut degrees, mut bands) = (0.0, -(parameters as f64), Vec::with_capacity(count));
-        for (k, sums) in sums.iter().enumerate() {
-            let found = error_of(sums, least, channels);
+    /// In some bands; `parameters` of the model were fitted to the same records.
+    pub(crate) fn new(
+        records: &[RecordLines<'_>],
+        channels: Channels,
+        partition: &Partition,
+        parameters: usize,
+    ) -> Self {
+        let sums = sums(records, channels, partition);
+        let least = least_power(&sums, channels);
+        let reached: Vec<Option<Explained>> =
+            sums.iter().map(|sums| Explained::new(sums, least(sums), channels)).collect();
+        let (mut statistic, mut degrees) = (0.0, -(parameters as f64));
+        let mut bands = Vec::with_capacity(partition.count());
+        for (k, (sums, share)) in sums.iter().zip(partition.middles()).enumerate() {
+            // A band of few lines says little of its noise, and those beside it nothing of a peak.
+            let beside = usize::from(sums.lines < BAND_LINES * channels.q);
+            let near = &reached[k - beside.min(k)..(k + 1 + beside).min(reached.len())];
+            let found = reached[k].as_ref().and_then(|own| error_of(sums, own, near, channels));
             if let Some(found) = &found {
                 statistic += found.statistic;
                 degrees += found.degrees;
             }
             let whole = found.filter(|f| f.degrees == (2 * channels.m * channels.p) as f64);
-            let share = 0.5 * (k as f64 + 0.5) / count as f64;
             let band = |f: BandError| Band {
                 share,
                 error: f.error,
@@ -102,7 +109,21 @@ impl LocalErrors {
             bands.push(whole.map(band));
         }
         let significance = (degrees > 0.0).then(|| chi_square_deviations(statistic, degrees));
-        LocalErrors { bands, significance }
+        LocalErrors { bands, partition: partition.clone(), significance }
+    }
+
+    /// The lowest and the highest share of the sample rate at which the bands within [`BAND_RATIO`] show an entry of the response within [`KNOWN`] of it; `power` is the square of the response in a band. From zero where the first band does.
+    pub(crate) fn range_shown(&self, entry: usize, power: &dyn Fn(usize) -> f64) -> Option<[f64; 2]> {
+        let shares: Vec<f64> = self.partition.middles().collect();
+        let of = |k: usize| self.bands[k].as_ref().map_or(0.0, |band| 1.0 / band.variance[entry].max(TINY));
+        let known = |k: &usize| {
+            let from = shares.partition_point(|s| *s < shares[*k] / BAND_RATIO);
+            let end = shares.partition_point(|s| *s <= shares[*k] * BAND_RATIO);
+            (from..end).map(of).sum::<f64>() * KNOWN * KNOWN * power(*k) > 1.0
+        };
+        let first = (0..shares.len()).find(known)?;
+        let last = (0..shares.len()).rev().find(known)?;
+        Some([if first == 0 { 0.0 } else { shares[first] }, shares[last]])
     }
 
     /// Squares of the errors beyond their variances.
@@ -178,7 +199,15 @@ impl Sums {
     }
 }
 
-fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usize) -> Vec<Sums> {
+/// Least power of a direction of the excitation over the lines of a band.
+fn least_power(all: &[Sums], channels: Channels) -> impl Fn(&Sums) -> f64 {
+    let power = |s: &Sums| (0..channels.q).map(|i| s.xx[(i, i)].re).sum::<f64>();
+    let lines = all.iter().map(|s| s.lines).sum::<usize>().max(1);
+    let of_line = WEAK_EXCITATION * all.iter().map(power).sum::<f64>() / lines as f64;
+    move |sums| (of_line * sums.lines as f64).max(TINY)
+}
+
+fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, partition: &Partition) -> Vec<Sums> {
     let zeros = |rows: usize| Mat::<c64>::zeros(rows, q);
     let empty = |_| Sums {
         lines: 0,
@@ -190,12 +219,12 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
         uu: Mat::zeros(m, m),
         octaves: [[0.0; 2]; OCTAVES],
     };
-    let mut all: Vec<Sums> = (0..count).map(empty).collect();
+    let mut all: Vec<Sums> = (0..partition.count()).map(empty).collect();
     for r in records {
         let total = r.v.len() / p.max(1);
         let h = hann(r.x, q);
         for k in 0..total {
-            let band = (k * count / total).min(count - 1);
+            let band = partition.of(k as f64 / total as f64);
             let sums = &mut all[band];
             sums.lines += 1;
             (0..p).for_each(|i| sums.vv[i] += r.v[k * p + i].norm_sqr());
@@ -204,7 +233,7 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
             }
             if band == 0 {
                 let share = 0.5 * (k + 1) as f64 / total as f64;
-                let below = (0.5 / (share * count as f64)).log2() as usize;
+                let below = (0.5 * partition.first() / share).log2() as usize;
                 let power: f64 = r.u[k * m..][..m].iter().map(c64::norm_sqr).sum();
                 let octave = &mut sums.octaves[below.min(OCTAVES - 1)];
                 *octave = [octave[0] + power, octave[1] + share * power];
@@ -226,16 +255,15 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
 pub(crate) fn explained_inputs(records: &[RecordLines<'_>], channels: Channels) -> Vec<Vec<c64>> {
     let Channels { m, p, q } = channels;
     let lines: usize = records.iter().map(|r| r.v.len() / p.max(1)).sum();
-    let count = band_count(lines, channels);
-    let all = sums(records, channels, count);
-    let power = |s: &Sums| (0..q).map(|i| s.xx[(i, i)].re).sum::<f64>();
-    let least = WEAK_EXCITATION * all.iter().map(power).sum::<f64>() / count as f64;
-    let gains: Vec<Option<Mat<c64>>> = all.iter().map(|s| gain(s, least)).collect();
+    let partition = Partition::equal(lines, channels);
+    let all = sums(records, channels, &partition);
+    let least = least_power(&all, channels);
+    let gains: Vec<Option<Mat<c64>>> = all.iter().map(|s| gain(s, least(s))).collect();
     let of = |r: &RecordLines<'_>| {
         let total = r.u.len() / m.max(1);
         let mut out = vec![c64::ZERO; total * m];
         for k in 0..total {
-            let Some(gain) = &gains[(k * count / total).min(count - 1)] else { continue };
+            let Some(gain) = &gains[partition.of(k as f64 / total as f64)] else { continue };
             for j in 0..m {
                 out[k * m + j] = (0..q).fold(c64::ZERO, |sum, a| sum + gain[(j, a)] * r.x[k * q + a]);
             }
@@ -251,7 +279,7 @@ fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
     let along = &sums.ux * eigen.U();
     let (m, q) = (along.nrows(), along.ncols());
     let explained = |i: usize, k: usize| along[(i, k)].norm_sqr() / eigen.S()[k].re;
-    let strong: Vec<usize> = (0..q).filter(|k| eigen.S()[*k].re > least.max(TINY)).collect();
+    let strong: Vec<usize> = (0..q).filter(|k| eigen.S()[*k].re > least).collect();
     let free = (sums.lines as f64 - strong.len() as f64).max(1.0);
     let left = |i: usize| (sums.uu[(i, i)].re - strong.iter().map(|k| explained(i, *k)).sum::<f64>()).max(0.0) / free;
     let left: Vec<f64> = (0..m).map(left).collect();
@@ -284,32 +312,67 @@ struct BandError {
     compares: bool,
 }
 
-fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<BandError> {
-    let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
-    let strong: Vec<usize> = (0..sums.xx.nrows()).filter(|k| eigen.S()[*k].re > least.max(TINY)).collect();
-    let free = sums.lines as f64 / HANN_LOSS - strong.len() as f64;
-    if strong.is_empty() || free < 1.0 {
-        return None;
+/// What the excitation explains in a band.
+struct Explained {
+    /// Directions of the excitation of unit power, q x their number.
+    basis: Mat<c64>,
+    /// Sums of the inputs with them.
+    u: Mat<c64>,
+    /// Sums of what the model leaves with them.
+    v: Mat<c64>,
+    /// Power of v that they leave, of each output, and its complex degrees of freedom.
+    left: Vec<f64>,
+    free: f64,
+}
+
+impl Explained {
+    /// `None` where the excitation has no power, or leaves no line to tell the noise by.
+    fn new(sums: &Sums, least: f64, Channels { p, .. }: Channels) -> Option<Self> {
+        let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
+        let strong: Vec<usize> = (0..sums.xx.nrows()).filter(|k| eigen.S()[*k].re > least).collect();
+        let free = sums.lines as f64 / HANN_LOSS - strong.len() as f64;
+        if strong.is_empty() || free < 1.0 {
+            return None;
+        }
+        let of_unit_power = |i: usize, k: usize| eigen.U()[(i, strong[k])] / eigen.S()[strong[k]].re.sqrt();
+        let basis = Mat::from_fn(sums.xx.nrows(), strong.len(), of_unit_power);
+        let (u, v) = (&sums.ux * &basis, &sums.vx * &basis);
+        let left = (0..p).map(|i| sums.vv[i] - v.row(i).squared_norm_l2()).collect();
+        Some(Explained { basis, u, v, left, free })
     }
-    let of_unit_power = |i: usize, k: usize| eigen.U()[(i, strong[k])] / eigen.S()[strong[k]].re.sqrt();
-    let basis = Mat::from_fn(sums.xx.nrows(), strong.len(), of_unit_power);
-    let (u, v) = (&sums.ux * &basis, &sums.vx * &basis);
-    let explained = |of: &Mat<c64>, i: usize| (0..strong.len()).map(|k| of[(i, k)].norm_sqr()).sum::<f64>();
+
+    /// Power of the noise of an output for each degree of freedom.
+    fn noise(bands: &[&Explained], output: usize) -> f64 {
+        let free: f64 = bands.iter().map(|band| band.free).sum();
+        bands.iter().map(|band| band.left[output]).sum::<f64>() / free
+    }
+}
+
+/// The error of a band; `near` are it and the bands beside it.
+fn error_of(
+    sums: &Sums,
+    own: &Explained,
+    near: &[Option<Explained>],
+    Channels { m, p, .. }: Channels,
+) -> Option<BandError> {
+    let Explained { basis, u, v, free, .. } = own;
+    let near: Vec<&Explained> = near.iter().flatten().collect();
     // Of correlated lines a sum has the variance of `HANN_LOSS` times as many.
-    let noise: Vec<f64> = (0..p).map(|i| ((sums.vv[i] - explained(&v, i)) / free).max(TINY)).collect();
-    let of_inputs = &sums.uu - &u * u.adjoint();
+    let noise = |i: usize| Explained::noise(&near, i).max(Explained::noise(&[own], i)).max(TINY);
+    let noise: Vec<f64> = (0..p).map(noise).collect();
+    let of_inputs = &sums.uu - u * u.adjoint();
     let svd = u.thin_svd().ok()?;
-    let sizes: Vec<f64> = (0..m.min(strong.len())).map(|k| svd.S()[k].re).collect();
+    let sizes: Vec<f64> = (0..m.min(basis.ncols())).map(|k| svd.S()[k].re).collect();
     // A direction of the inputs that the excitation hardly moves shows the noise that the feedback brings there: E would be that of K.
     let moved = |k: usize| {
         let along = svd.U().col(k);
-        let noise = (along.adjoint() * &of_inputs * along).re.max(0.0) / free;
+        let noise = (along.adjoint() * &of_inputs * along).re.max(0.0) / *free;
         sizes[k] > LEAST_DIRECTION * sizes[0] && sizes[k] * sizes[k] > LEAST_MOVED * noise
     };
     let rank = (0..sizes.len()).take_while(|k| moved(*k)).count();
     // v V: the error along each direction of the excited inputs, with the variance of the noise
-    let along = &v * svd.V();
-    let centred = centred(sums, &basis, svd.V());
+    let along = v * svd.V();
+    let centred = centred(sums, basis, svd.V());
     let degrees = (2 * rank * p) as f64;
     let (mut error, mut variance) = (vec![c64::ZERO; p * m], vec![0.0; p * m]);
     let mut statistic = 0.0;
@@ -323,9 +386,10 @@ fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<
         }
     }
     // Mean of the square of Student's variable with `2 free` degrees of freedom.
+    let free = near.iter().map(|band| band.free).sum::<f64>();
     statistic *= ((free - 1.0) / free).max(0.5);
     let last = rank.checked_sub(1)?;
-    let noise: f64 = (0..m).map(|j| svd.U()[(j, last)].norm_sqr() * of_inputs[(j, j)].re.max(0.0) / free).sum();
+    let noise: f64 = (0..m).map(|j| svd.U()[(j, last)].norm_sqr() * of_inputs[(j, j)].re.max(0.0) / own.free).sum();
     let compares = sizes[last] > LEAST_COMPARED * sizes[0] && sizes[last] * sizes[last] > LEAST_MOVED * noise;
     Some(BandError { statistic, degrees, error, variance, compares })
 }

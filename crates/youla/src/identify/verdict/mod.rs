@@ -22,6 +22,7 @@ pub(crate) mod limits;
 mod local_error;
 pub(crate) mod loop_ratio;
 mod nonlinear;
+mod partition;
 mod parts;
 #[cfg(test)]
 mod tests;
@@ -121,7 +122,8 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     if let Some(witness) = on.witness {
         evidence.push(indirect(on, witness, &weigh));
     }
-    let shown = of_region(on.plant, on.region, loops.as_ref())?;
+    let confirmed = confirmed(on)?;
+    let shown = of_region(on.plant, on.region, loops.as_ref(), &|share, i, j| confirmed(share, i, j))?;
     let information = on.witness.zip(loops.as_ref()).map(|(witness, loops)| information(on, witness, loops));
     let informed = information.as_ref().is_none_or(Evidence::holds);
     evidence.extend(information);
@@ -150,17 +152,49 @@ pub(crate) fn of_response(
     feedback: Option<&StateSpace<Discrete>>,
 ) -> Result<Judgement> {
     let loops = Loops::new(plant, region, feedback)?;
-    let (test, judgement) = of_region(plant, region, loops.as_ref())?;
+    let (test, judgement) = of_region(plant, region, loops.as_ref(), &|_, _, _| true)?;
     let mut evidence: Vec<Evidence> =
         feedback.map(|k| stability(plant, region, k)).transpose()?.flatten().into_iter().collect();
     evidence.push(test);
     Ok(Judgement { evidence, ..judgement })
 }
 
-fn of_region(plant: &StateSpace<Discrete>, region: &Region, loops: Option<&Loops>) -> Result<(Evidence, Judgement)> {
+/// Whether an entry is within the frequencies at which the excitation shows it, given a share of the sample rate: beyond them a model continues what
+/// it has, and a mode that is there is in no figure. Everywhere where the excitation is not known.
+fn confirmed(on: &Judged<'_>) -> Result<impl Fn(f64, usize, usize) -> bool> {
+    let (p, m, ts) = (on.plant.outputs(), on.plant.inputs(), on.plant.time().ts());
+    let sizes = &on.problem.sizes;
+    let ranges = on.witness.map(|witness| {
+        let shares: Vec<f64> = witness.narrow.partition.middles().collect();
+        let omega: Vec<f64> = shares.iter().map(|share| std::f64::consts::TAU * share / ts).collect();
+        let g = frequency_response(on.plant, &omega)?;
+        let power = |band: usize, entry: usize| {
+            let (i, j) = (entry / m, entry % m);
+            (g.at(band)[(i, j)].norm() * sizes.u[j] / sizes.y[i]).powi(2)
+        };
+        Ok::<_, crate::Error>(
+            (0..p * m).map(|entry| witness.narrow.range_shown(entry, &|band| power(band, entry))).collect::<Vec<_>>(),
+        )
+    });
+    let ranges = ranges.transpose()?;
+    Ok(move |share: f64, i: usize, j: usize| {
+        ranges.as_ref().is_none_or(|ranges| ranges[i * m + j].is_some_and(|[low, high]| (low..=high).contains(&share)))
+    })
+}
+
+/// `shown` says whether a band may reach a share of the sample rate, entry by entry.
+fn of_region(
+    plant: &StateSpace<Discrete>,
+    region: &Region,
+    loops: Option<&Loops>,
+    shown: &dyn Fn(f64, usize, usize) -> bool,
+) -> Result<(Evidence, Judgement)> {
     let omega: Vec<f64> = region.hz.iter().map(|hz| std::f64::consts::TAU * hz).collect();
     let g = frequency_response(plant, &omega)?;
-    let within = |k: usize, i: usize, j: usize| valid(region.absolute[k][(i, j)], g.at(k)[(i, j)]);
+    let ts = plant.time().ts();
+    let within = |k: usize, i: usize, j: usize| {
+        valid(region.absolute[k][(i, j)], g.at(k)[(i, j)]) && shown(region.hz[k] * ts, i, j)
+    };
     let (p, m) = (plant.outputs(), plant.inputs());
     let of = |i: usize, j: usize| bands(&region.hz, |k| within(k, i, j));
     let entry_bands = (0..p).map(|i| (0..m).map(|j| of(i, j)).collect()).collect();

@@ -231,6 +231,14 @@ fn with_friction(friction: f64) -> Identified {
 }
 
 fn with(fault: &Fault) -> Identified {
+    of(&[recorded(fault)])
+}
+
+fn of(records: &[LoopRecord]) -> Identified {
+    identify(records, &[], &RunningController::new(controller(1.0)), None, &LikelihoodOptions::default()).unwrap()
+}
+
+fn recorded(fault: &Fault) -> LoopRecord {
     let (g, rng) = (plant(1.0), &mut ChaCha8Rng::seed_from_u64(2));
     let rows = CLEAN.samples;
     let mut normal = |size: f64| Mat::from_fn(rows, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
@@ -250,9 +258,7 @@ fn with(fault: &Fault) -> Identified {
         x = g.a() * &x + g.b() * acts;
         before = moved;
     }
-    let record = LoopRecord::new(time(), u, y).unwrap().with_input_excitation(d).unwrap();
-    let running = RunningController::new(controller(1.0));
-    identify(&[record], &[], &running, None, &LikelihoodOptions::default()).unwrap()
+    LoopRecord::new(time(), u, y).unwrap().with_input_excitation(d).unwrap()
 }
 
 /// The part of the region at 10 Hz that is distortion.
@@ -301,8 +307,7 @@ fn play_at_the_output_is_named() {
     assert!(!play(&loose).required && loose.trusted(), "{:?}", loose.reasons());
     let friction = outcome(&loose, "(nonlinearity)");
     assert!(friction.figure < 0.01, "{friction}");
-    let [of_clean, of_loose] = [&clean, &loose].map(distortion);
-    assert!(of_clean == 0.0 && of_loose > 0.001, "{of_clean} {of_loose}");
+    assert!(distortion(&clean) == 0.0 && distortion(&loose) > 0.001, "{} {}", distortion(&clean), distortion(&loose));
 }
 
 /// A gain that rises by 6 % is named within a tenth of its size; that of the clean loop is chance.
@@ -327,6 +332,10 @@ fn a_command_logged_before_its_limit_is_judged_by_what_the_limit_takes() {
     }
     assert!(rare.trusted() && dead.trusted(), "{:?} {:?}", rare.reasons(), dead.reasons());
     assert_eq!(outcome(&often, "(nonlinearity)").outcome, TestOutcome::Failed);
+    // Beside three records without a limit it is judged alone.
+    let one_of_four = of(&[9.0, 1.1, 9.0, 9.0].map(|limit| recorded(&Fault { limit, noise: 0.005, ..NONE })));
+    let test = outcome(&one_of_four, "(nonlinearity)");
+    assert!(test.outcome == TestOutcome::Failed && test.note.contains("in record 2 of 4"), "{test}");
 }
 
 /// `u = 0.8 (what the limit left) - 0.05 y`: the law of the file holds but for the samples after those at the limit.

@@ -3,7 +3,8 @@
 
 use super::excess::Excess;
 use super::limits::BAND_RATIO;
-use super::local_error::{Channels, LocalErrors, RecordLines, band_count, explained_inputs, hann};
+use super::local_error::{Channels, LocalErrors, RecordLines, explained_inputs, hann};
+use super::partition::Partition;
 use crate::identify::likelihood::LoopSignals;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
@@ -25,6 +26,8 @@ struct Group {
 pub(crate) struct Witness {
     /// In all records.
     pub(crate) whole: LocalErrors,
+    /// The same in bands that are narrow at low frequency.
+    pub(crate) narrow: LocalErrors,
     /// Mean squares of these errors beyond chance.
     pub(crate) distortion: Excess,
     /// Mean squares of the differences between groups of records beyond chance.
@@ -88,19 +91,19 @@ impl Witness {
         let all: Vec<RecordLines<'_>> = first.lines().chain(second.iter().flat_map(Group::lines)).collect();
         let lines = |all: &[RecordLines<'_>]| all.iter().map(|r| r.v.len() / channels.p).sum::<usize>();
         let parameters = solution.chosen.found.parameters;
-        let whole = LocalErrors::new(&all, channels, band_count(lines(&all), channels), parameters);
+        let whole = LocalErrors::new(&all, channels, &Partition::equal(lines(&all), channels), parameters);
+        let narrow = LocalErrors::new(&all, channels, &Partition::narrow(lines(&all), all.len(), channels), 0);
         let mut groups: Vec<Group> = split(&of_records, problem.skip).iter().filter_map(|g| group(g)).collect();
         let has_fresh = second.is_some();
         groups.extend(second);
-        let of_group = |g: &Group| g.lines().map(|r| r.v.len() / channels.p).sum::<usize>();
-        let shortest = groups.iter().map(of_group).min().unwrap_or(0);
-        let count = band_count(shortest, channels);
-        let of = |g: &Group| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0);
+        let of_group = |g: &Group| lines(&g.lines().collect::<Vec<_>>());
+        let shared = Partition::equal(groups.iter().map(of_group).min().unwrap_or(0), channels);
+        let of = |g: &Group| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, &shared, 0);
         let errors: Vec<LocalErrors> = groups.iter().map(of).collect();
         let fresh = errors.last().filter(|_| has_fresh);
         let against_fresh = fresh.map(|fresh| LocalErrors::difference([&of(&first), fresh])).unwrap_or_default();
         let variation = LocalErrors::scatter(&errors);
-        Some(Witness { distortion: whole.excess(), variation, against_fresh, whole, excited })
+        Some(Witness { distortion: whole.excess(), variation, against_fresh, whole, narrow, excited })
     }
 }
 
@@ -108,7 +111,7 @@ impl Witness {
     /// Whether the excitation shows the response near a frequency, a share of the sample rate.
     pub(crate) fn shows(&self, turns: f64) -> bool {
         let bands = &self.whole.bands;
-        let place = |share: f64| ((2.0 * share * bands.len() as f64) as usize).min(bands.len().saturating_sub(1));
+        let place = |share: f64| self.whole.partition.of(2.0 * share);
         bands
             .get(place(turns / BAND_RATIO)..=place(turns * BAND_RATIO))
             .is_some_and(|near| near.iter().any(Option::is_some))

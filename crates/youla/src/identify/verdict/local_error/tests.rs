@@ -52,7 +52,7 @@ fn the_unit_of_the_first_band_is_a_mean_over_its_power() {
     let v: Vec<c64> = (1..=10 * lines).map(|k| c64::from(0.01 * response(k as f64 * 1e-4)[0].sqrt())).collect();
     let channels = Channels { m: 1, p: 1, q: 1 };
     let share = 0.5 / (10 * lines) as f64;
-    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 10, 0);
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, &Partition::of_count(10), 0);
     let unit = found.excess().bands[0].units(&|s| response(s * 1e-4 / share))[0].sqrt();
     assert!((unit / mean - 1.0).abs() < 0.2, "{unit} {mean}");
     assert!((found.bands[0].as_ref().unwrap().error[0].re / (0.01 * unit) - 1.0).abs() < 0.2);
@@ -72,7 +72,7 @@ fn an_excitation_counts_beside_a_move() {
         v.push((moves + excitation) * 0.1 + unit() * 1e-3);
     }
     let channels = Channels { m: 1, p: 1, q: 2 };
-    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 5, 0);
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, &Partition::of_count(5), 0);
     for band in &found.bands {
         let error = band.as_ref().unwrap().error[0];
         assert!((error - 0.1).norm() < 2e-3, "{error}");
@@ -98,7 +98,12 @@ fn a_sweep_in_the_middle_of_a_record_is_no_error_by_chance() {
         let u = Mat::from_fn(n, 1, |k, _| sweep(k));
         let v = Mat::from_fn(n, 1, |_, _| noise());
         let [x, v] = [&u, &v].map(|signal| hann(&lines_of(signal.as_ref(), 0), 1));
-        let found = LocalErrors::new(&[RecordLines { u: &x, v: &v, x: &x }], Channels { m: 1, p: 1, q: 1 }, 50, 0);
+        let found = LocalErrors::new(
+            &[RecordLines { u: &x, v: &v, x: &x }],
+            Channels { m: 1, p: 1, q: 1 },
+            &Partition::of_count(50),
+            0,
+        );
         for band in found.bands.iter().flatten().filter(|b| (0.2..0.45).contains(&b.share)) {
             squares += band.error[0].norm_sqr() / band.variance[0];
             count += 1.0;
@@ -124,9 +129,44 @@ fn a_weak_direction_counts_beside_the_noise_along_it() {
         v.push(weak * 0.2 + unit() * 1e-5);
     }
     let channels = Channels { m: 2, p: 1, q: 2 };
-    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 4, 0);
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, &Partition::of_count(4), 0);
     for band in &found.bands {
         let error = &band.as_ref().unwrap().error;
         assert!((error[0] - 0.1).norm() < 0.01 && (error[1] + 0.1).norm() < 0.01, "{error:?}");
     }
+}
+
+/// Of an excitation between 0.01 and 0.1 of the sample rate, with noise a tenth of what it moves and no input elsewhere but noise, the range is that
+/// of the excitation within a sixth of an octave; of a response 1000 times smaller there is none.
+#[test]
+fn a_band_ends_where_the_excitation_does() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(8);
+    let mut unit = || c64::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5);
+    let lines = 4000;
+    let excited = |k: usize| (80..800).contains(&k);
+    let x: Vec<c64> = (0..lines).map(|k| if excited(k) { unit() } else { unit() * 1e-6 }).collect();
+    let u: Vec<c64> = x.iter().map(|x| x + unit() * 1e-2).collect();
+    let v: Vec<c64> = (0..lines).map(|_| unit() * 0.1).collect();
+    let channels = Channels { m: 1, p: 1, q: 1 };
+    let partition = Partition::narrow(lines, 1, channels);
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, &partition, 0);
+    let [low, high] = found.range_shown(0, &|_| 1.0).unwrap();
+    assert!((0.0088..0.0105).contains(&low) && (0.095..0.114).contains(&high), "{low} {high}");
+    assert!(found.range_shown(0, &|_| 1e-6).is_none());
+}
+
+/// Bands of a record of 12 000 samples: eight lines at first, 40 in the end, and no wider than an eighth of their frequency between.
+#[test]
+fn bands_are_narrow_at_low_frequency() {
+    let (lines, channels) = (6000, Channels { m: 1, p: 1, q: 1 });
+    let partition = Partition::narrow(lines, 1, channels);
+    let first = |partition: &Partition| (partition.first() * lines as f64).round();
+    assert_eq!(first(&partition), 8.0);
+    let middles: Vec<f64> = partition.middles().map(|share| 2.0 * share * lines as f64).collect();
+    let steps = || middles.windows(2).take(middles.len() - 2).map(|pair| (pair[1] - pair[0], pair[1]));
+    assert!(steps().all(|(step, at)| step <= (0.125 * at).max(8.0) + 1.0 && step < 40.5));
+    assert!(steps().any(|(step, _)| step > 39.5));
+    assert!(middles.iter().enumerate().all(|(k, at)| partition.of(at / lines as f64) == k));
+    // Of many records a band holds three lines of each.
+    assert_eq!(first(&Partition::narrow(lines, 10, channels)), 30.0);
 }

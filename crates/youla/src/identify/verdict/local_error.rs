@@ -9,10 +9,14 @@
 //! Neighbouring bands are averaged with the weights of their information, so that a band in which the excitation shows nothing does
 //! not speak.
 
+mod inputs;
+
+pub(crate) use inputs::explained_inputs;
+
 use super::excess::{Excess, ExcessBand};
 use super::limits::{
-    BAND_LINES, BAND_RATIO, HANN_LOSS, KNOWN, LEAST_COMPARED, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED,
-    LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION,
+    BAND_LINES, BAND_RATIO, HANN_LOSS, KNOWN, LEAST_COMPARED, LEAST_DIRECTION, LEAST_MOVED, LOCAL_CHANCE,
+    OVERALL_CHANCE, WEAK_EXCITATION,
 };
 use super::partition::Partition;
 use crate::linalg::TINY;
@@ -112,7 +116,13 @@ impl LocalErrors {
         LocalErrors { bands, partition: partition.clone(), significance }
     }
 
-    /// The lowest and the highest share of the sample rate at which the bands within [`BAND_RATIO`] show an entry of the response within [`KNOWN`] of it; `power` is the square of the response in a band. From zero where the first band does.
+    /// Whether the excitation moves every input in any band.
+    pub(crate) fn shows_all(&self) -> bool {
+        self.bands.iter().any(Option::is_some)
+    }
+
+    /// The lowest and the highest share of the sample rate at which the bands within [`BAND_RATIO`] show an entry of the response within [`KNOWN`] of
+    /// it, from zero where the first band does; `power` is the square of the response in a band.
     pub(crate) fn range_shown(&self, entry: usize, power: &dyn Fn(usize) -> f64) -> Option<[f64; 2]> {
         let shares: Vec<f64> = self.partition.middles().collect();
         let of = |k: usize| self.bands[k].as_ref().map_or(0.0, |band| 1.0 / band.variance[entry].max(TINY));
@@ -248,46 +258,6 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, partition: 
         }
     }
     all
-}
-
-/// The inputs as far as the excitation explains them, lines x m for each record: `S_ux S_xx^-1 x` in each band. Lines without a window:
-/// a window hides what a sweep excites at the ends of a record, and what the ends leak is small beside what an input is asked for here.
-pub(crate) fn explained_inputs(records: &[RecordLines<'_>], channels: Channels) -> Vec<Vec<c64>> {
-    let Channels { m, p, q } = channels;
-    let lines: usize = records.iter().map(|r| r.v.len() / p.max(1)).sum();
-    let partition = Partition::equal(lines, channels);
-    let all = sums(records, channels, &partition);
-    let least = least_power(&all, channels);
-    let gains: Vec<Option<Mat<c64>>> = all.iter().map(|s| gain(s, least(s))).collect();
-    let of = |r: &RecordLines<'_>| {
-        let total = r.u.len() / m.max(1);
-        let mut out = vec![c64::ZERO; total * m];
-        for k in 0..total {
-            let Some(gain) = &gains[partition.of(k as f64 / total as f64)] else { continue };
-            for j in 0..m {
-                out[k * m + j] = (0..q).fold(c64::ZERO, |sum, a| sum + gain[(j, a)] * r.x[k * q + a]);
-            }
-        }
-        out
-    };
-    records.iter().map(of).collect()
-}
-
-/// `S_ux S_xx^-1` along the directions of the excitation that explain more of an input than chance does.
-fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
-    let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
-    let along = &sums.ux * eigen.U();
-    let (m, q) = (along.nrows(), along.ncols());
-    let explained = |i: usize, k: usize| along[(i, k)].norm_sqr() / eigen.S()[k].re;
-    let strong: Vec<usize> = (0..q).filter(|k| eigen.S()[*k].re > least).collect();
-    let free = (sums.lines as f64 - strong.len() as f64).max(1.0);
-    let left = |i: usize| (sums.uu[(i, i)].re - strong.iter().map(|k| explained(i, *k)).sum::<f64>()).max(0.0) / free;
-    let left: Vec<f64> = (0..m).map(left).collect();
-    let moves = |k: &usize| (0..m).any(|i| explained(i, *k) > LEAST_EXPLAINED * left[i]);
-    let mut inverse = vec![0.0; q];
-    strong.iter().filter(|k| moves(k)).for_each(|k| inverse[*k] = 1.0 / eigen.S()[*k].re);
-    let scaled = Mat::from_fn(m, q, |i, k| along[(i, k)] * inverse[k]);
-    Some(&scaled * eigen.U().adjoint())
 }
 
 /// By how much the variance of a sum of the noise with the excitation exceeds that for an excitation spread over the record, along each column

@@ -160,21 +160,20 @@ pub(crate) fn of_response(
 }
 
 /// Whether an entry is within the frequencies at which the excitation shows it, given a share of the sample rate: beyond them a model continues what
-/// it has, and a mode that is there is in no figure. Everywhere where the excitation is not known.
+/// it has, and a mode that is there is in no figure. Everywhere where the excitation is not known, or nowhere moves every input.
 fn confirmed(on: &Judged<'_>) -> Result<impl Fn(f64, usize, usize) -> bool> {
     let (p, m, ts) = (on.plant.outputs(), on.plant.inputs(), on.plant.time().ts());
     let sizes = &on.problem.sizes;
-    let ranges = on.witness.map(|witness| {
-        let shares: Vec<f64> = witness.narrow.partition.middles().collect();
+    let ranges = on.witness.map(|witness| &witness.narrow).filter(|narrow| narrow.shows_all()).map(|narrow| {
+        let shares: Vec<f64> = narrow.partition.middles().collect();
         let omega: Vec<f64> = shares.iter().map(|share| std::f64::consts::TAU * share / ts).collect();
         let g = frequency_response(on.plant, &omega)?;
         let power = |band: usize, entry: usize| {
             let (i, j) = (entry / m, entry % m);
             (g.at(band)[(i, j)].norm() * sizes.u[j] / sizes.y[i]).powi(2)
         };
-        Ok::<_, crate::Error>(
-            (0..p * m).map(|entry| witness.narrow.range_shown(entry, &|band| power(band, entry))).collect::<Vec<_>>(),
-        )
+        let of = |entry: usize| narrow.range_shown(entry, &|band| power(band, entry));
+        Ok::<_, crate::Error>((0..p * m).map(of).collect::<Vec<_>>())
     });
     let ranges = ranges.transpose()?;
     Ok(move |share: f64, i: usize, j: usize| {

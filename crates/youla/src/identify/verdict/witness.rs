@@ -119,7 +119,7 @@ impl Witness {
 
     /// The lines of the estimation records with the part of the inputs that the excitation explains; `None` where it does not reach all.
     pub(crate) fn excited(&self, spectra: &Spectra) -> Option<Spectra> {
-        if self.whole.bands.iter().all(Option::is_none) || self.excited.len() != spectra.records.len() {
+        if !self.whole.shows_all() || self.excited.len() != spectra.records.len() {
             return None;
         }
         let mut out = spectra.clone();

@@ -52,8 +52,10 @@ struct Kept {
     valid_to: f64,
 }
 
-/// `|I - S|` beyond the bands of validity from which it is said: of a response of which nothing is known there, twice as much makes the loop unstable.
+/// `|I - S|` beyond the bands of validity from which it is said, where it is more than twice that of the controller that ran, under which the machine
+/// was stable: of a response of which nothing is known there, twice as much makes the loop unstable.
 const LITTLE_GAIN: f64 = 0.5;
+const MORE: f64 = 2.0;
 
 /// The highest frequency of the bands of validity that a run folder states, Hz.
 fn valid_to(run: &Path) -> Result<f64> {
@@ -118,7 +120,8 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
         "stable": stable, "drawn": kept.drawn, "draws": draws.len(), "unstable": unstable, "inputs": kept.inputs, "outputs": kept.outputs,
         "worst_pole": centre.worst_pole()?.map_or(0.0, |pole| pole.norm()),
     });
-    if let Some([hz, gain]) = beyond(&centre, (m, p), &omega, kept.valid_to)? {
+    let ran = closed_loop(&plant, &with_input_port(&kept.running.system(time)?)?)?;
+    if let Some([hz, gain]) = beyond([&centre, &ran], (m, p), &omega, kept.valid_to)? {
         answer["beyond"] = json!({ "valid_to": kept.valid_to, "hz": hz, "gain": gain });
     }
     answer["hz"] = json!(omega.iter().map(|w| w / TAU).collect::<Vec<_>>());
@@ -153,18 +156,22 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     Ok(answer)
 }
 
-/// Frequency and size of the largest `|I - S|` beyond the bands of validity; `None` where it is small.
+/// Frequency and size of the largest `|I - S|` beyond the bands of validity; `None` where it is small, or not much larger than that of the
+/// controller that ran.
 fn beyond(
-    looped: &StateSpace<Discrete>,
+    loops: [&StateSpace<Discrete>; 2],
     (m, p): (usize, usize),
     omega: &[f64],
     valid_to: f64,
 ) -> Result<Option<[f64; 2]>> {
     let above: Vec<f64> = omega.iter().copied().filter(|w| *w > TAU * valid_to).collect();
-    let s = frequency_response(&looped.part(m..m + p, m..m + p), &above)?;
-    let of = |s: faer::MatRef<'_, c64>| (s - Mat::<c64>::identity(p, p)).norm_l2();
-    let largest = s.iter().map(of).zip(&above).max_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(largest.filter(|(gain, _)| *gain > LITTLE_GAIN).map(|(gain, w)| [w / TAU, gain]))
+    let size = |s: faer::MatRef<'_, c64>| (s - Mat::<c64>::identity(p, p)).norm_l2();
+    let of = |looped: &StateSpace<Discrete>| -> Result<Vec<f64>> {
+        Ok(frequency_response(&looped.part(m..m + p, m..m + p), &above)?.iter().map(size).collect())
+    };
+    let (new, ran) = (of(loops[0])?, of(loops[1])?);
+    let much = new.into_iter().zip(ran).zip(above).filter(|((new, ran), _)| *new > LITTLE_GAIN.max(MORE * ran));
+    Ok(much.max_by(|a, b| a.0.0.total_cmp(&b.0.0)).map(|((gain, _), w)| [w / TAU, gain]))
 }
 
 /// Lines of the figures, dense at light resonances, rad/s.

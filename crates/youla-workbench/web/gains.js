@@ -102,7 +102,7 @@ const gains = (() => {
     if (!found.stable) return ["bad", "Unstable", `Unstable on the recommended model: largest pole ${readOut(found.worst_pole)}.${rest}`];
     if (found.unstable) return ["bad", `Unstable on ${found.unstable} of ${draws} models`, `Unstable on ${found.unstable} of ${draws} models ${part ? "that the controller that ran stabilises" : "of the region"}.${rest}`];
     const worst = worstOf(found), peak = `${readOut(found.margins.sensitivity)}, at worst ${readOut(worst)} over the region`, word = worst > NEARLY ? "Nearly unstable" : "Little margin";
-    if (found.beyond) return ["caution", "Beyond what the model shows", `Stable on ${models}; but the loop still acts at ${readOut(found.beyond.hz)} Hz (|I - S| ${readOut(found.beyond.gain)}), and no response is valid to 10 % above ${readOut(found.beyond.valid_to)} Hz: a resonance that the model lacks there may make it unstable. Peak sensitivity ${peak}.${rest}`];
+    if (worst <= LITTLE && found.beyond) return ["caution", "Beyond what the model shows", `Stable on ${models}; but the loop still acts at ${readOut(found.beyond.hz)} Hz (|I - S| ${readOut(found.beyond.gain)}), and no response is valid to 10 % above ${readOut(found.beyond.valid_to)} Hz: a resonance that the model lacks there may make it unstable. Peak sensitivity ${peak}.${rest}`];
     if (worst <= LITTLE) return ["good", "", `Stable on ${models}; peak sensitivity ${peak}.${rest}`];
     return [worst > NEARLY ? "bad" : "caution", `${word}: peak sensitivity ${readOut(worst)}`, `${word}: stable on ${models}, but the peak sensitivity is ${peak}; ${worst > NEARLY ? "ISO 14839-3 allows up to 4 for unrestricted operation" : "up to 2 is good"}.${rest}`];
   }

@@ -163,3 +163,19 @@ def test_cuts_are_records(record: youla.Record) -> None:
     assert (first.name, second.name) == ("log-estimation", "log-verification")
     assert second.y.tolist() == record[1000:].y.tolist()
     assert record.named("other").name == "other"
+
+
+def test_a_column_of_dates_and_a_matrix_of_one_column_are_channels(table: np.ndarray) -> None:
+    pd = pytest.importorskip("pandas")
+    seconds = 1e-3 * np.arange(len(table))
+    dates = np.datetime64("2026-01-01") + (seconds * 1e9).astype("timedelta64[ns]")
+    data = {"t": dates, "u": table[:, [0]], "y": table[:, 1]}
+    for frame in (data, pd.DataFrame({name: np.ravel(values) for name, values in data.items()})):
+        record = youla.Record(frame, inputs="u", outputs="y", time="t")
+        assert record.dt == pytest.approx(1e-3) and np.array_equal(record.u, table[:, [0]])
+    assert youla.Record({"t": list(seconds), "u": table[:, 0], "y": table[:, 1]}, inputs="u", outputs="y", time="t").dt == pytest.approx(1e-3)
+
+
+def test_models_are_equal_by_their_matrices() -> None:
+    one, same, other = (youla.Model([[a]], [[1.0]], [[1.0]], [[0.0]], dt=1e-3) for a in (0.5, 0.5, 0.6))
+    assert one == same and hash(one) == hash(same) and one != other and one != 1

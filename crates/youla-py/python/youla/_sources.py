@@ -159,7 +159,7 @@ def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | Non
 def _seconds(times: Any) -> Any:
     """Dates and durations as seconds from the first; numbers as they are."""
     dtype = getattr(times, "dtype", None)
-    if getattr(dtype, "kind", "") not in "mM" or len(times) == 0:
+    if getattr(dtype, "kind", "") not in ("m", "M") or len(times) == 0:
         return times
     return (times - times[0]) / np.timedelta64(1, "s")
 

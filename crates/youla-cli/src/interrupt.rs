@@ -28,9 +28,11 @@ pub(crate) fn without_result(unfinished: &Path) -> Reached {
     let stage = Arc::clone(&reached);
     let _ = ctrlc::set_handler(move || {
         let Some(stage) = stage.lock().ok().and_then(|stage| *stage) else { end("interrupted") };
-        // What cannot be removed is removed by the next run.
-        let _ = std::fs::remove_dir_all(&unfinished);
         let [at, of] = [stage as usize + 1, Stage::COUNT];
+        // While files are written and take the place of an older run, all is left as it is; what is left is removed by the next run.
+        if at <= Stage::Write as usize {
+            let _ = std::fs::remove_dir_all(&unfinished);
+        }
         let name = stage.name();
         end(&format!(
             "interrupted in stage {at} of {of}, {name}: no result is written; --time-limit SECONDS keeps the best model found by then"

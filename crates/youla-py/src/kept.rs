@@ -147,17 +147,17 @@ pub(crate) fn redesign_pid<'py>(
     py: Python<'py>,
     chosen: Options,
     logs: Vec<Log<'py>>,
-    points: (Vec<(ModelIn<'py>, PyRef<'py, Region>)>, bool),
+    points: Vec<(ModelIn<'py>, PyRef<'py, Region>)>,
+    trusted: bool,
     choices: Options,
 ) -> PyResult<(String, ModelOut<'py>)> {
     let (chosen, logs) = (chosen.settings()?, records(py, logs)?);
     let point = |(model, region): &(ModelIn<'py>, PyRef<'py, Region>)| Ok((model_in(model)?, region.region.clone()));
-    let (points, trusted) = points;
     let points: Vec<_> = points.iter().map(point).collect::<Result<_>>()?;
     let new = worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;
         let points = points.iter().map(|(plant, region)| (plant, region)).collect();
-        Ok(pid_kept(&chosen, &records, (points, trusted), &choices.of("redesign")?)?)
+        Ok(pid_kept(&chosen, &records, points, trusted, &choices.of("redesign")?)?)
     })?;
     let promised = serde_json::to_string(&youla_run::PidEntry::from(&new)).map_err(Failure::from)?;
     Ok((promised, model_out(py, &new.system)))

@@ -18,7 +18,7 @@ use youla::identify::likelihood::Region;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response, simulate};
 use youla::signal::Channel;
 use youla_io::{ModelFile, SystemMatrices, read_text};
-use youla_run::ControllerSettings;
+use youla_run::{ControllerSettings, Summary};
 
 /// Plants drawn from the region; a share p of unstable loops is missed with probability (1 - p)^n, 5 % for p = 3 %.
 const DRAWS: usize = 100;
@@ -59,10 +59,8 @@ const MORE: f64 = 2.0;
 
 /// The highest frequency of the bands of validity that a run folder states, Hz.
 fn valid_to(run: &Path) -> Result<f64> {
-    let summary: Value = serde_json::from_str(&read_text(&run.join("summary.json"))?)?;
-    let rows = summary["recommended"]["entry_bands"].as_array().into_iter().flatten();
-    let bands = rows.filter_map(Value::as_array).flatten().filter_map(Value::as_array).flatten();
-    Ok(bands.filter_map(|band| band[1].as_f64()).fold(0.0, f64::max))
+    let entries = Summary::read(run)?.recommended.map_or(Vec::new(), |found| found.entry_bands);
+    Ok(entries.iter().flatten().flatten().map(|[_, high]| *high).fold(0.0, f64::max))
 }
 
 fn file_of(run: &Path) -> PathBuf {

@@ -100,7 +100,7 @@ def _pid(runs: Sequence[Run], options: Mapping[str, Any]) -> tuple[str, Matrices
             raise InputError(f"run[{k}] had another controller or sample time than run[0]; one controller is redesigned for points at which it ran")
     settings, logs, _ = again(kept[0])
     trusted = all(run.verdict.trusted for run in runs)
-    return _native.redesign_pid(settings, logs, ([k.point() for k in kept], trusted), plain(options))
+    return _native.redesign_pid(settings, logs, [k.point() for k in kept], trusted, plain(options))
 
 
 def _equal(a: Matrices, b: Matrices) -> bool:

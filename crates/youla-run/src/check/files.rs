@@ -117,7 +117,7 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
                 job.time.of_column(&what, &times)?;
             }
             let problem = format!(
-                "rows {first} to {} between two gaps of the time are too few to tell the sample time by: the steps of the time are irregular. \
+                "rows {first} to {} between two gaps of the time are too few to determine the sample time: the steps of the time are irregular. \
                  `youla synchronise` brings the channels to one clock; sample_time in [data] states it where the time is only logged unsteadily",
                 first + times.len() - 1
             );

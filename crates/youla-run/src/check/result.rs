@@ -36,7 +36,7 @@ impl DataCheck {
     pub(crate) fn grouped(&self) -> Vec<(&Finding, usize)> {
         let mut groups: Vec<Vec<&Finding>> = Vec::new();
         for finding in &self.findings {
-            // The names of the numbers say what mends the log.
+            // The names of the numbers say what corrects the log.
             fn kind(f: &Finding) -> (Test, Severity, Option<&str>, Vec<&String>) {
                 let causes = f.numbers.keys().filter(|_| f.test == Test::Controller && f.severity > Severity::Note);
                 (f.test, f.severity, f.channel.as_deref(), causes.collect())

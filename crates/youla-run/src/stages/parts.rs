@@ -50,11 +50,12 @@ pub fn redesign_kept(
 pub fn pid_kept(
     settings: &RunSettings,
     records: &RunRecords,
-    points: (Vec<(&StateSpace<Discrete>, &Region)>, bool),
+    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    trusted: bool,
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let declared = declared_loop(settings, records, Path::new("."))?;
-    pid_of(RunContext { settings, records, declared: &declared, factorisation: None }, points, options)
+    pid_of(RunContext { settings, records, declared: &declared, factorisation: None }, points, trusted, options)
 }
 
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.

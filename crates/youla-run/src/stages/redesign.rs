@@ -33,7 +33,7 @@ pub(crate) fn redesigned(
 pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<Result<PidRedesign>> {
     let options = run.settings.redesign.as_ref()?;
     options.structure?;
-    Some(pid_of(run, (vec![(&recommended.plant, &recommended.region)], recommended.trusted()), options))
+    Some(pid_of(run, vec![(&recommended.plant, &recommended.region)], recommended.trusted(), options))
 }
 
 /// One PID for plants and their regions at which the controller of a run ran.
@@ -42,7 +42,8 @@ pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<R
 /// As [`design_pid`].
 pub(crate) fn pid_of(
     run: RunContext<'_>,
-    (points, trusted): (Vec<(&StateSpace<Discrete>, &Region)>, bool),
+    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    trusted: bool,
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let (running, delay) = (run.declared.controller(), run.settings.controller.delay());

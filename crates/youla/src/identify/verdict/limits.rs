@@ -3,7 +3,7 @@
 /// Lines of a band for each channel of the excitation. Enough for the power of the noise within 16 % (`1 / sqrt(40)`); a band of 40 lines of a
 /// record of 12 000 samples is 0.3 % of the sample rate wide.
 pub(crate) const BAND_LINES: usize = 40;
-/// Least lines of a band for each channel of the excitation, at low frequency: four that count, of which three are left to tell the noise by.
+/// Least lines of a band for each channel of the excitation, at low frequency: four that count, of which three are left to estimate the noise from.
 pub(crate) const LEAST_BAND_LINES: usize = 8;
 /// Width of a band over its frequency, between these limits: half of the window over which bands are averaged.
 pub(crate) const BAND_SHARE: f64 = 0.12;

@@ -96,7 +96,7 @@ impl LocalErrors {
         for (k, (sums, share)) in sums.iter().zip(partition.middles()).enumerate() {
             // A band of few lines says little of its noise, and those beside it nothing of a peak.
             let beside = usize::from(sums.lines < BAND_LINES * channels.q);
-            let near = &reached[k - beside.min(k)..(k + 1 + beside).min(reached.len())];
+            let near = &reached[k.saturating_sub(beside)..(k + 1 + beside).min(reached.len())];
             let found = reached[k].as_ref().and_then(|own| error_of(sums, own, near, channels));
             if let Some(found) = &found {
                 statistic += found.statistic;
@@ -296,7 +296,7 @@ struct Explained {
 }
 
 impl Explained {
-    /// `None` where the excitation has no power, or leaves no line to tell the noise by.
+    /// `None` where the excitation has no power, or leaves no line to estimate the noise from.
     fn new(sums: &Sums, least: f64, Channels { p, .. }: Channels) -> Option<Self> {
         let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
         let strong: Vec<usize> = (0..sums.xx.nrows()).filter(|k| eigen.S()[*k].re > least).collect();

@@ -114,8 +114,9 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let (mut evidence, parts) = of_all(spectra, solution);
     let significant = evidence[..OF_RECORDS].iter().any(|e| e.significance.is_some_and(|s| s > BEYOND_CHANCE));
     if spectra.records.len() > 1 && significant {
+        let Solution { chosen, samples, .. } = solution;
+        let mut alone = Solution { chosen: chosen.clone(), rivals: Vec::new(), unseen: None, samples: *samples };
         for (k, lines) in spectra.records.iter().enumerate() {
-            let mut alone = Solution { rivals: Vec::new(), unseen: None, ..solution.clone() };
             alone.chosen.found.point.ends = vec![solution.chosen.found.point.ends[k].clone()];
             let of_record = of_all(&Spectra { records: vec![lines.clone()], ..*spectra }, &alone).0;
             for (worst, here) in evidence[..OF_RECORDS].iter_mut().zip(of_record) {

@@ -21,7 +21,7 @@ impl Partition {
     }
 
     /// Bands that are narrow at low frequency, where responses fall by decades: as wide as a share of their frequency, between
-    /// [`LEAST_BAND_LINES`] and [`BAND_LINES`] lines for each excitation, and no narrower than a window tells apart in each of some records.
+    /// [`LEAST_BAND_LINES`] and [`BAND_LINES`] lines for each excitation, and no narrower than a window resolves in each of some records.
     pub(crate) fn narrow(lines: usize, records: usize, channels: Channels) -> Self {
         let most = (BAND_LINES * channels.q.max(1)).min(lines.max(1));
         let least = (LEAST_BAND_LINES * channels.q.max(1)).max(LEAST_OF_RECORD * records).min(most);

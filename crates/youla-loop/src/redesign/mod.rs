@@ -227,13 +227,20 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
                 candidates,
             });
         }
-        tried[k].0.refused = band.map(|b| {
-            format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within)
+        tried[k].0.refused = band.map(|b| match b.impossible <= b.models {
+            true => format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within),
+            false => contradicted(b.impossible, b.models),
         });
     }
     let reasons: Vec<String> =
         tried.iter().filter_map(|(c, _)| Some(format!("weight {}: {}", c.input_weight, c.refused.as_ref()?))).collect();
     Err(Error::NoRedesign { reasons: reasons.join("; ") })
+}
+
+/// Why models that are left of a region prove nothing.
+fn contradicted(impossible: usize, models: usize) -> String {
+    let all = impossible + models;
+    format!("the running controller does not stabilise {impossible} of {all} models of the region, which the log contradicts")
 }
 
 fn check(options: &RedesignOptions) -> Result<()> {

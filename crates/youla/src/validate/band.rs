@@ -50,9 +50,10 @@ pub struct BandCertificate {
 }
 
 impl BandCertificate {
-    /// Whether the controller stabilises every model that was tested within the region, and the estimate.
+    /// Whether the controller stabilises every model that was tested within the region, and the estimate. Where more than half of the drawn
+    /// models are impossible, those that are left are no region.
     pub fn holds(&self) -> bool {
-        self.unstable_within == 0 && self.radius.value < 1.0
+        self.unstable_within == 0 && self.radius.value < 1.0 && self.impossible <= self.models
     }
 }
 

@@ -90,7 +90,9 @@ impl PidRedesign {
         if !self.trusted {
             reasons.push("the model is not trusted, and what is proved on its region may not hold".to_owned());
         }
-        if !p.holds() {
+        if p.impossible > p.models {
+            reasons.push(super::contradicted(p.impossible, p.models));
+        } else if !p.holds() {
             reasons.push(format!(
                 "of {} fresh models of the region {} are unstable and {} miss a limit",
                 p.models, p.unstable, p.missed

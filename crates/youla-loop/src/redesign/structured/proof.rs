@@ -61,9 +61,10 @@ pub struct PidProof {
 }
 
 impl PidProof {
-    /// Whether no model is unstable and the limits hold for the share [`LEVEL`] of models at least.
+    /// Whether no model is unstable and the limits hold for the share [`LEVEL`] of models at least; where the log contradicts more than half of the
+    /// draws, the models that are left are no region.
     pub fn holds(&self) -> bool {
-        self.unstable == 0 && self.at_most <= 1.0 - LEVEL
+        self.unstable == 0 && self.at_most <= 1.0 - LEVEL && self.impossible <= self.models
     }
 
     /// Whether the running controller keeps the limits by the same standard.

@@ -11,6 +11,7 @@ use super::response_error::{EntryErrors, ResponseError};
 use super::{Directions, Parts, physical};
 use crate::control::ChannelScales;
 use crate::identify::likelihood::data::spectra::Sizes;
+use crate::identify::likelihood::search::model::Model;
 use crate::lti::{Discrete, StateSpace};
 use crate::statistics::two_sided_student;
 use crate::{Mat, Result, c64};
@@ -22,6 +23,11 @@ use rayon::prelude::*;
 /// Step of the central differences along an independent error of the parameters, in its standard deviations: small against the
 /// curvature of a figure, large against rounding.
 const STEP: f64 = 1e-3;
+/// The criterion of N samples takes `2 N log |z|` for a pole outside of the unit circle (the noise passes it mirrored), which the normal
+/// distribution of the parameters lacks: at `1 + OUTSIDE / N` the likelihood is that without it times exp(-3).
+const OUTSIDE: f64 = 3.0;
+/// Draws in place of one with such a pole, at most.
+const REDRAWN: usize = 100;
 /// A rival of less weight, for which a figure does not exist, does not make its interval unbounded.
 const NEGLIGIBLE: f64 = 0.01;
 
@@ -201,9 +207,14 @@ impl Region {
         Ok(values.into_iter().zip(variances).map(|(value, v)| Interval::normal(value, v.sqrt(), level)).collect())
     }
 
-    /// Plants as the estimate could have come out, in the order of drawing: the parameters are normal; a model that the records do
-    /// not distinguish comes with the frequency of its weight, at distance zero. A draw depends on the seed and its place only.
+    /// Plants as the estimate could have come out, in the order of drawing: the parameters are normal, but no more poles than those of the estimate
+    /// lie outside of the unit circle; a model that the records do not distinguish comes with the frequency of its weight, at distance zero. A
+    /// draw depends on the seed and its place only.
     pub fn draws(&self, count: usize, seed: u64) -> Vec<Draw> {
+        // the lowest frequency is that of one period in the records
+        let radius = 1.0 + OUTSIDE * self.hz.first().map_or(0.0, |hz| hz * self.time.ts());
+        let outside = |model: &Model| model.poles().iter().filter(|pole| pole.norm() > radius).count();
+        let allowed = outside(&self.directions.moved(&vec![0.0; self.directions.errors()]).0);
         let draw = |place: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(place);
@@ -213,7 +224,10 @@ impl Region {
                 let plant = physical::realised(model, delays, &self.sizes, self.time).ok()?;
                 return Some(Draw { plant, distance: 0.0 });
             }
-            let errors: Vec<f64> = (0..self.directions.errors()).map(|_| rng.sample(StandardNormal)).collect();
+            let drawn = || (0..self.directions.errors()).map(|_| rng.sample(StandardNormal)).collect::<Vec<f64>>();
+            let errors = std::iter::repeat_with(drawn)
+                .take(REDRAWN)
+                .find(|errors| outside(&self.directions.moved(errors).0) <= allowed)?;
             let distance = errors.iter().map(|e| e * e).sum::<f64>().sqrt();
             Some(Draw { plant: self.plant_at(&errors).ok()?, distance })
         };
@@ -235,5 +249,35 @@ impl Region {
     fn rivals(&self) -> impl Iterator<Item = (Result<StateSpace<Discrete>>, f64)> + '_ {
         let realised = |(model, delays, weight)| (physical::realised(model, delays, &self.sizes, self.time), weight);
         self.directions.rivals().map(realised)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::root::Root;
+    use super::*;
+    use crate::identify::likelihood::search::chart::Chart;
+
+    /// Draws of a region of one pole that is known to 0.2, from 1000 samples.
+    fn drawn(pole: f64) -> Vec<Draw> {
+        let one = Mat::<f64>::identity(1, 1);
+        let model = Model::of((&one * pole).as_ref(), one.as_ref(), one.as_ref(), vec![0.0]).unwrap();
+        let mut chart = Chart::fixed(&model);
+        chart.directions[0] = Mat::from_fn(3, 1, |i, _| if i == 0 { 1.0 } else { 0.0 });
+        let directions = Directions::of_parts((model, vec![0]), chart, Root::dense(&one * 0.2), Vec::new());
+        let sizes = Sizes { u: vec![1.0], y: vec![1.0] };
+        Region::new(sizes, Discrete::new(1.0).unwrap(), &[1e-3, 0.1, 0.4], directions).draws(500, 1)
+    }
+
+    /// A third of the normal distribution lies outside of the circle, where the records of a stable plant cannot lie.
+    #[test]
+    fn a_draw_has_no_more_poles_outside_than_the_estimate() {
+        let draws = drawn(0.9);
+        assert_eq!(draws.len(), 500);
+        assert!(draws.iter().all(|draw| draw.plant.a()[(0, 0)] <= 1.003));
+        // the normal distribution that is cut at 1.003, half a deviation above its mean: P(z < -1) / P(z < 0.515)
+        let below = draws.iter().filter(|draw| draw.plant.a()[(0, 0)] < 0.7).count() as f64 / 500.0;
+        assert!((below - 0.159 / 0.697).abs() < 0.06, "{below}");
+        assert!(drawn(1.1).iter().any(|draw| draw.plant.a()[(0, 0)] > 1.2));
     }
 }

@@ -178,6 +178,7 @@ fn the_header_of_a_pid_computes_the_controller() {
             notches: c.notches.iter().map(|n| ([n.hz, n.width, n.depth], n.coefficients(TS))).collect(),
             delay: 0,
             reference_filter: 0.0,
+            reference_weights: [1.0; 2],
             origin: "a test".into(),
         };
         let header = export_pid(&pid, PidForm::C).unwrap();

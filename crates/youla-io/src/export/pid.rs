@@ -43,6 +43,8 @@ pub struct PidExport {
     pub delay: usize,
     /// Time constant of a filter of the reference that keeps the overshoot of a step to 10 %, seconds; zero for none.
     pub reference_filter: f64,
+    /// Weights of the reference in the proportional and in the derivative part with which this overshoot holds.
+    pub reference_weights: [f64; 2],
     /// Where it comes from.
     pub origin: String,
 }
@@ -128,6 +130,14 @@ fn head(pid: &PidExport) -> Vec<String> {
         let by = number(pid.ts / (pid.ts + pid.reference_filter));
         lines.push(format!(
             "a filter of the reference, w = w + {by} (r - w) and w in the place of r, keeps the overshoot of a step to 10 %; it is not in this code"
+        ));
+    }
+    let [b, c] = pid.reference_weights;
+    if [b, c] != [1.0; 2] {
+        lines.push(format!(
+            "steps of the reference come out as promised where kp takes {} r - y and kd {} r - y, as in the running controller",
+            number(b),
+            number(c)
         ));
     }
     if pid.delay > 0 {

@@ -209,6 +209,7 @@ mod tests {
             notches: vec![([180.0, 0.3, 0.1], [[1.0; 3]; 2])],
             delay: 0,
             reference_filter: 0.0,
+            reference_weights: [1.0; 2],
             origin: "a run".into(),
         }
     }

@@ -240,7 +240,9 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
 /// Why models that are left of a region prove nothing.
 fn contradicted(impossible: usize, models: usize) -> String {
     let all = impossible + models;
-    format!("the running controller does not stabilise {impossible} of {all} models of the region, which the log contradicts")
+    format!(
+        "the running controller does not stabilise {impossible} of {all} models of the region, which the log contradicts"
+    )
 }
 
 fn check(options: &RedesignOptions) -> Result<()> {

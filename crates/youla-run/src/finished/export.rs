@@ -130,6 +130,10 @@ pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
         notches: c.notches.iter().map(notch).collect(),
         delay: c.delay,
         reference_filter: found.steps.last().and_then(|s| s.reference_filters.get(place)).copied().unwrap_or(0.0),
+        reference_weights: found
+            .reference_weights
+            .and_then(|of| of.get(place).map(|w| [w.proportional, w.derivative]))
+            .unwrap_or([1.0; 2]),
         origin: origin(run, &path)?,
     })
 }

@@ -3,7 +3,7 @@
 use super::decibels::decibel;
 use super::redesign::loops;
 use youla::identify::likelihood::figure as digits;
-use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep};
+use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep, ReferenceWeights};
 use youla_report::data::{self, DrawnMethod, EvidenceTable, LineStatus, MethodRole, ReportPart, Verdict};
 use youla_report::figure::{Area, Axis, Content, Curve, Figure, Layout, Panel};
 
@@ -78,7 +78,10 @@ fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
     let step = |s: &PlannedStep| {
         let gains = s.controllers.as_ref().map_or("no PID".into(), |of| all_gains(of));
         let each = |of: Vec<String>| of.join(", ");
-        let overshoots = each(s.overshoots.iter().map(|share| digits(100.0 * share)).collect());
+        let mut overshoots = each(s.overshoots.iter().map(|share| digits(100.0 * share)).collect());
+        if overshoots.is_empty() {
+            overshoots = "not predicted".into();
+        }
         let none = |time: &f64| if *time > 0.0 { digits(*time) } else { "none".into() };
         let filters = each(s.reference_filters.iter().map(none).collect());
         vec![
@@ -107,17 +110,46 @@ fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
             )
         },
         EvidenceTable {
-            caption: "Change the gains in these steps, each stable at all models; revert.json holds the running controller. Gains in \
-                      parallel form, negative feedback. Overshoot after a step of the reference, upper end of the band; a filter of the reference with \
-                      the time constant in the last column, w += ts / (ts + T) (r - w), keeps it to 10 % and changes nothing in the loop."
-                .into(),
+            caption: format!(
+                "Change the gains in these steps, each stable at all models; revert.json holds the running controller. Gains in parallel form, \
+                 negative feedback. {}",
+                of_reference(new.reference_weights.as_deref())
+            ),
             ..EvidenceTable::new(
                 "The way to the new controller",
-                &["Step", "Gains", "Peak sensitivity", "Phase margin", "Bandwidth, Hz", "Overshoot, %", "Reference filter T, s"],
+                &[
+                    "Step",
+                    "Gains",
+                    "Peak sensitivity",
+                    "Phase margin",
+                    "Bandwidth, Hz",
+                    "Overshoot, %",
+                    "Reference filter T, s",
+                ],
                 new.steps.iter().map(step).collect(),
             )
         },
     ]
+}
+
+/// What the columns of the step of the reference say.
+fn of_reference(weights: Option<&[ReferenceWeights]>) -> String {
+    let Some(weights) = weights else {
+        return "The path from the reference is no PID with weights of the reference: its step is not predicted."
+            .into();
+    };
+    let filter = "Overshoot after a step of the reference, upper end of the band; a filter of the reference with the time constant in the last \
+                  column, w += ts / (ts + T) (r - w), keeps it to 10 % and changes nothing in the loop.";
+    let weight = |w: &ReferenceWeights| {
+        format!("kp takes {} r - y and kd {} r - y", digits(w.proportional), digits(w.derivative))
+    };
+    match weights.iter().all(|w| *w == ReferenceWeights::ERROR) {
+        true => filter.into(),
+        false => format!(
+            "{filter} The reference enters as in the running controller: {}.",
+            weights.iter().map(weight).collect::<Vec<_>>().join("; ")
+        ),
+    }
 }
 
 fn shown(value: f64) -> String {
@@ -174,7 +206,7 @@ pub(crate) fn figure(new: &PidRedesign) -> Figure {
     };
     let step = |i: usize| over_time("Step of the reference", i, "y per step", &|s| &s.responses[i]);
     let command = |i: usize| over_time("Command after the step", i, "u per step", &|s| &s.commands[i]);
-    let all = 0..new.controllers.len();
+    let all = 0..new.reference_weights.as_ref().map_or(0, Vec::len);
     let panels = loops.map(sensitivity).chain(all.clone().map(step)).chain(all.map(command)).collect();
     Figure {
         key: "response".into(),

@@ -173,6 +173,22 @@ impl ControllerSettings {
         }
     }
 
+    /// From the references to u, where that is another path than that from the outputs.
+    pub(crate) fn reference_path(&self, time: Discrete) -> Result<Option<StateSpace<Discrete>>> {
+        let Self::DifferenceEquation { denominator, delay, reference_numerator: Some(path), .. } = self else {
+            return Ok(None);
+        };
+        let (p, m) = path.shape();
+        let (numerator, denominator) = (path.spread(p, m), denominator.spread(p, m));
+        let system = StateSpace::difference_equation(&numerator, &denominator, time)?;
+        Ok(Some(delayed(system, *delay)?))
+    }
+
+    /// Whether a path from the reference is stated, which must be an excitation of the inputs before records are read.
+    pub(super) fn has_reference_path(&self) -> bool {
+        matches!(self, Self::DifferenceEquation { reference_numerator: Some(_), .. })
+    }
+
     /// The number of loops of PIDs.
     pub(super) fn pid_loops(&self) -> Option<usize> {
         match self {
@@ -200,9 +216,7 @@ impl ControllerSettings {
         nominal: Option<&StateSpace<Discrete>>,
         folder: &Path,
     ) -> Result<RunningController> {
-        let left = matches!(self, Self::DifferenceEquation { reference_numerator: Some(_), .. });
-        let unread = left.then(|| "reference_numerator belongs to settings that were `checked`".to_owned());
-        refuse(self.problem().or(unread), Path::new("run.toml"))?;
+        refuse(self.problem(), Path::new("run.toml"))?;
         let (feedback, delay, system) = match self {
             Self::DifferenceEquation { feedback, numerator, denominator, delay, .. } => {
                 let (p, m) = numerator.shape();

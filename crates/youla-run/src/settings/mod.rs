@@ -196,12 +196,18 @@ impl RunSettings {
             .problem()
             .or_else(|| self.response_problem())
             .or_else(|| self.controller.problem())
+            .or_else(|| self.reference_problem())
             .or_else(|| self.nominal_problem())
             .or_else(|| self.loop_problem())
             .or_else(|| self.pid_problem())
             .or_else(|| self.redesign_problem())
             .or_else(|| self.number_problem());
         problem.or_else(structure)
+    }
+
+    fn reference_problem(&self) -> Option<String> {
+        let unread = self.controller.has_reference_path() && !self.data.has_reference_path();
+        unread.then(|| "reference_numerator belongs to settings that were `checked`".to_owned())
     }
 
     fn response_problem(&self) -> Option<String> {

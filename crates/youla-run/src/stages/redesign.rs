@@ -47,7 +47,9 @@ pub(crate) fn pid_of(
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let (running, delay) = (run.declared.controller(), run.settings.controller.delay());
-    let found = design_pid(&PidProblem { points, running, delay, trusted }, &options.pid, &options.band);
+    let reference = run.settings.controller.reference_path(running.time())?;
+    let problem = PidProblem { points, running, delay, reference, trusted };
+    let found = design_pid(&problem, &options.pid, &options.band);
     found.map_err(|e| Error::from(e).within("[redesign]"))
 }
 

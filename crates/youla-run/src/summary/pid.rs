@@ -4,7 +4,9 @@ use super::entries::finite;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use youla_loop::redesign::structured::{Band, FigureBand, LEVEL, PidController, PidOptions, PidRedesign, PlannedStep};
+use youla_loop::redesign::structured::{
+    Band, FigureBand, LEVEL, PidController, PidOptions, PidRedesign, PlannedStep, ReferenceWeights,
+};
 
 /// A new PID, or one for each loop, with its proof.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -21,6 +23,9 @@ pub struct PidEntry {
     pub proof: ProofEntry,
     /// Figures with their limits and bands.
     pub figures: Vec<FigureEntry>,
+    /// How the reference enters each loop, as it does in the running controller; `null` where that is no PID with weights, and the step of the
+    /// reference is not predicted.
+    pub reference_weights: Option<Vec<ReferenceWeights>>,
     /// The way to the new controller; `half` is left out where it is unstable at one of the models.
     pub steps: Vec<StepEntry>,
     /// Why it should not be taken; empty where it keeps what it promises.
@@ -110,6 +115,7 @@ impl From<&PidRedesign> for PidEntry {
                 at_most: proof.at_most,
             },
             figures: proof.figures.iter().map(FigureEntry::from).collect(),
+            reference_weights: new.reference_weights.clone(),
             steps: new.steps.iter().map(StepEntry::from).collect(),
             reservations: new.reservations(),
         }

@@ -19,6 +19,7 @@ mod pid;
 mod plan;
 mod proof;
 mod recognise;
+mod reference;
 mod scenarios;
 mod search;
 mod space;
@@ -30,6 +31,7 @@ pub use options::{ControllerStructure, PidOptions, PidTerms};
 pub use pid::{Discretisation, Notch, PidController, PidGains, diagonal};
 pub use plan::PlannedStep;
 pub use proof::{Band, FigureBand, LEVEL, PidProof};
+pub use reference::ReferenceWeights;
 
 use crate::error::{Error, Result};
 use channels::{couples, each};
@@ -55,6 +57,8 @@ pub struct PidProblem<'a> {
     pub running: &'a StateSpace<Discrete>,
     /// Dead time in whole samples that the machine adds to its controller; it is in `running` too.
     pub delay: usize,
+    /// From the references to u, where that is another path than that of the error.
+    pub reference: Option<StateSpace<Discrete>>,
     /// Whether the verdict trusts every model.
     pub trusted: bool,
 }
@@ -76,6 +80,8 @@ pub struct PidRedesign {
     pub rejections: Vec<f64>,
     /// The proof on fresh draws; of several operating points that of the worst one.
     pub proof: PidProof,
+    /// How the reference enters each loop; `None` where it is no PID with weights, and its step is not predicted.
+    pub reference_weights: Option<Vec<ReferenceWeights>>,
     /// The way to the new controller.
     pub steps: Vec<PlannedStep>,
     /// Whether the verdict trusts the models on which all this rests.
@@ -121,7 +127,7 @@ impl PidRedesign {
 /// [`youla::Error::NotStabilising`] where the running controller does not stabilise the plant.
 pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
     options.check()?;
-    let PidProblem { points, running, delay, trusted } = problem;
+    let PidProblem { points, running, delay, reference, trusted } = problem;
     let (running, delay) = (*running, *delay);
     if let Some((what, instead)) = unsupported(problem)? {
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
@@ -167,12 +173,14 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
     let worse = |a: &PidProof, b: &PidProof| a.unstable.cmp(&b.unstable).then(a.at_most.total_cmp(&b.at_most));
     let proof = proofs.collect::<Result<Vec<_>>>()?.into_iter().max_by(worse).ok_or_else(missing)?;
     let fresh = Scenarios::joined(fresh, std::iter::empty());
+    let reference_weights = reference::weights(&grid, reference.as_ref(), &known)?;
     let running_gains: Option<Vec<PidController>> = known.into_iter().collect();
     let size = |c: &PidController| grid.controller(c).response[0].norm();
     Ok(PidRedesign {
         rejections: controllers.iter().zip(&on).map(|(new, ran)| size(new) / ran.response[0].norm()).collect(),
         proof,
-        steps: plan(&grid, &fresh, (ran, running_gains.as_deref()), (new, &controllers))?,
+        steps: plan(&grid, &fresh, reference_weights.as_deref(), (ran, running_gains.as_deref()), (new, &controllers))?,
+        reference_weights,
         running: running.clone(),
         running_gains,
         options: options.clone(),

@@ -4,6 +4,7 @@
 use super::margins::GridMargins;
 use super::pid::{Notch, PidController, PidGains, whole};
 use super::proof::{Band, band};
+use super::reference::ReferenceWeights;
 use super::scenarios::{Grid, Judged, Scenario, Scenarios};
 use crate::error::Result;
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ pub struct PlannedStep {
     pub phase_margin: Band,
     /// Bandwidth, Hz.
     pub bandwidth: Band,
-    /// Instants of the responses to a unit step of the reference, seconds.
+    /// Instants of the responses to a unit step of the reference, seconds; none, with those and what follows from them, where it is not predicted.
     pub seconds: Vec<f64>,
     /// y of each loop at these, after a step of its own reference.
     pub responses: Vec<Vec<Band>>,
@@ -53,11 +54,12 @@ pub struct PlannedStep {
     pub reference_filters: Vec<f64>,
 }
 
-/// The steps, the running controller first; between the two the mean of their gains or, where the running
+/// The steps, given how the reference enters each loop, the running controller first; between the two the mean of their gains or, where the running
 /// one is no PID, of the controllers; it is left out where it is unstable at a model.
 pub(super) fn plan(
     grid: &Grid,
     fresh: &Scenarios,
+    weights: Option<&[ReferenceWeights]>,
     (running, of_running): (Judged<'_>, Option<&[PidController]>),
     (new, of_new): (Judged<'_>, &[PidController]),
 ) -> Result<Vec<PlannedStep>> {
@@ -75,7 +77,7 @@ pub(super) fn plan(
         ("half", half, between),
         ("new", Some(of_new.to_vec()), new),
     ]
-    .map(|(name, controllers, judged)| step(grid, fresh, (name, controllers, judged), samples))
+    .map(|(name, controllers, judged)| step(grid, fresh, weights, (name, controllers, judged), samples))
     .into_iter()
     .collect::<Result<Vec<_>>>()?;
     Ok(steps.into_iter().filter(|s| s.unstable == 0 || s.name != "half").collect())
@@ -84,6 +86,7 @@ pub(super) fn plan(
 fn step(
     grid: &Grid,
     fresh: &Scenarios,
+    weights: Option<&[ReferenceWeights]>,
     (name, controllers, Judged { system, on }): (&'static str, Option<Vec<PidController>>, Judged<'_>),
     samples: usize,
 ) -> Result<PlannedStep> {
@@ -94,9 +97,15 @@ fn step(
     let tested = fresh.plants.iter().zip(&stable).filter(|(_, stable)| **stable).take(DRAWS);
     let plants: Vec<&Scenario> = tested.map(|(plant, _)| plant).collect();
     let every = samples.div_ceil(INSTANTS);
-    let of_loop =
-        |i: usize| plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect::<Result<Vec<_>>>();
-    let of_loops = (0..on.len()).map(of_loop).collect::<Result<Vec<_>>>()?.into_iter();
+    let added = |(i, weights): (usize, &ReferenceWeights)| match &controllers {
+        Some(of) => weights.added(&of[i], samples, system.time()),
+        None => Ok(vec![0.0; samples]),
+    };
+    let added = weights.into_iter().flatten().enumerate().map(added).collect::<Result<Vec<_>>>()?;
+    let of_loop = |(i, added): (usize, &Vec<f64>)| {
+        plants.par_iter().map(|p| response(&p.plant, system, i, added)).collect::<Result<Vec<_>>>()
+    };
+    let of_loops = added.iter().enumerate().map(of_loop).collect::<Result<Vec<_>>>()?.into_iter();
     let (all, commands): (Vec<_>, Vec<_>) = of_loops.map(|of| of.into_iter().unzip::<_, _, Vec<_>, Vec<_>>()).unzip();
     let bands = |of: &Vec<Vec<f64>>| {
         (0..samples).step_by(every).map(|t| band(of.iter().map(|y| y[t]).collect())).collect::<Vec<Band>>()
@@ -109,7 +118,7 @@ fn step(
         peak_sensitivity: of(|m| m.peak_sensitivity),
         phase_margin: of(|m| m.phase),
         bandwidth: of(|m| m.bandwidth),
-        seconds: (0..samples).step_by(every).map(|t| t as f64 * grid.ts).collect(),
+        seconds: (0..samples).step_by(every).map(|t| t as f64 * grid.ts).filter(|_| weights.is_some()).collect(),
         responses: all.iter().map(bands).collect(),
         commands: commands.iter().map(bands).collect(),
         overshoots: all.iter().map(|of| overshoot(of, 0.0)).collect(),
@@ -143,18 +152,28 @@ fn reference_filter(responses: &[Vec<f64>]) -> f64 {
     high
 }
 
-/// y and u of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r.
+/// y and u of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r; `added` comes to u beside what the
+/// controller makes of the error.
 fn response(
     plant: &StateSpace<Discrete>,
     k: &StateSpace<Discrete>,
     i: usize,
-    samples: usize,
+    added: &[f64],
 ) -> Result<(Vec<f64>, Vec<f64>)> {
     let port = plant.inputs() + i;
-    let looped = closed_loop(plant, &with_input_port(k)?)?.part(0..plant.inputs() + plant.outputs(), port..port + 1);
-    let start = vec![0.0; looped.order()];
-    let y = simulate(&looped, Mat::from_fn(samples, 1, |_, _| -1.0).as_ref(), &start)?;
-    Ok((0..samples).map(|t| (1.0 + y[(t, port)], y[(t, i)])).unzip())
+    let looped = closed_loop(plant, &with_input_port(k)?)?;
+    let of = |t: usize, j: usize| {
+        if j == port {
+            -1.0
+        } else if j == i {
+            added[t]
+        } else {
+            0.0
+        }
+    };
+    let driven = Mat::from_fn(added.len(), looped.inputs(), of);
+    let y = simulate(&looped, driven.as_ref(), &vec![0.0; looped.order()])?;
+    Ok((0..added.len()).map(|t| (1.0 + y[(t, port)], y[(t, i)])).unzip())
 }
 
 /// Half way: the geometric mean of gains and filters, the mean where one is missing or has another sign; notches of half their depth in

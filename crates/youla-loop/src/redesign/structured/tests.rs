@@ -191,7 +191,13 @@ fn identified_under(
 fn what_is_promised_holds_on_the_machine() {
     let model = identified(8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
+    let problem = PidProblem {
+        points: vec![(&model.plant, &model.region)],
+        running: &k,
+        delay: 0,
+        reference: None,
+        trusted: true,
+    };
     let options = PidOptions { notches: 1, command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -214,6 +220,40 @@ fn what_is_promised_holds_on_the_machine() {
     assert!((new.steps[2].responses[0].last().unwrap()[1] - 1.0).abs() < 0.05);
 }
 
+/// Where the reference has weight 0.7 in the proportional part and the derivative acts on y alone, the step is predicted so: on the machine itself it
+/// overshoots by little more than 10 % behind the filter. A path that is no PID is not predicted.
+#[test]
+fn a_reference_with_weights_steps_as_promised() {
+    let model = identified(8.0);
+    let own = running();
+    let k = own.system(time()).unwrap();
+    let weighed = |of: &PidGains| PidGains { kp: 0.7 * of.kp, kd: 0.0, ..*of }.system(time()).unwrap();
+    let reference = Some(weighed(&own.gains));
+    let problem =
+        PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, reference, trusted: true };
+    let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
+    let band = BandOptions { draws: 60, seed: 1 };
+    let new = design_pid(&problem, &options, &band).unwrap();
+    let [weights] = new.reference_weights.unwrap()[..] else { panic!() };
+    assert!((weights.proportional - 0.7).abs() < 1e-6 && weights.derivative.abs() < 1e-6, "{weights:?}");
+    let last = &new.steps[2];
+    assert!(last.overshoots[0] > 0.1 && last.reference_filters[0] > 0.0, "{last:?}");
+    let lag = last.reference_filters[0] / 1e-3;
+    let r = Mat::from_fn(3000, 1, |t, _| 1.0 - (lag / (1.0 + lag)).powi(t as i32 + 1));
+    let path = weighed(&new.controllers[0].gains);
+    let added = simulate(&path, r.as_ref(), &vec![0.0; path.order()]).unwrap();
+    let looped = closed_loop(&machine(8.0), &with_input_port(&new.system).unwrap()).unwrap().part(1..2, 0..1);
+    let y = simulate(&looped, added.as_ref(), &vec![0.0; looped.order()]).unwrap();
+    let most = y.col(0).iter().fold(0.0, |a: f64, b| a.max(*b));
+    assert!((most - 1.1).abs() < 0.02, "{most}");
+
+    let other = weighed(&PidGains { ki: 2.0 * own.gains.ki, ..own.gains });
+    let new = design_pid(&PidProblem { reference: Some(other), ..problem }, &options, &band).unwrap();
+    assert!(
+        new.reference_weights.is_none() && new.steps.iter().all(|s| s.responses.is_empty() && s.overshoots.is_empty())
+    );
+}
+
 /// One controller for a machine whose brake and resonance change: the limits hold at both points, which the gains for the first alone do not
 /// promise, and the proof is that of the worse point.
 #[test]
@@ -223,8 +263,10 @@ fn one_controller_serves_several_operating_points() {
     let both = vec![(&first.plant, &first.region), (&second.plant, &second.region)];
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
-    let of =
-        |points| design_pid(&PidProblem { points, running: &k, delay: 0, trusted: true }, &options, &band).unwrap();
+    let of = |points| {
+        design_pid(&PidProblem { points, running: &k, delay: 0, reference: None, trusted: true }, &options, &band)
+            .unwrap()
+    };
     let new = of(both);
     assert!(new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
     for brake in [8.0, 1.0] {
@@ -243,7 +285,13 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
     let plant = pair(0.3);
     let k = whole(&[running(), running()], time()).unwrap();
     let model = identified_under(&plant, &k, vec![1, 1], 8);
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
+    let problem = PidProblem {
+        points: vec![(&model.plant, &model.region)],
+        running: &k,
+        delay: 0,
+        reference: None,
+        trusted: true,
+    };
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let new = design_pid(&problem, &options, &band).unwrap();
@@ -264,7 +312,13 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
 fn a_refusal_names_the_limit() {
     let model = identified(-8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, trusted: true };
+    let problem = PidProblem {
+        points: vec![(&model.plant, &model.region)],
+        running: &k,
+        delay: 0,
+        reference: None,
+        trusted: true,
+    };
     let band = BandOptions { draws: 30, seed: 1 };
     let refusal = |options: PidOptions| design_pid(&problem, &options, &band).err().unwrap().to_string();
     let late = refusal(PidOptions { delay_margin: 1.0, ..PidOptions::default() });

@@ -24,7 +24,7 @@ mod text;
 pub use c_controller::{CController, ControllerExport, c_controller};
 pub use c_loop::{LoopExport, c_loop};
 pub use controller::{ExportedController, ObserverData};
-pub use pid::{PidExport, PidForm, export_pid};
+pub use pid::{PidExport, PidForm, export_pid, weighted_error};
 pub use pid_tables::Firmware;
 pub use precision::SingleError;
 pub use read::{model_from_bytes, read_model};

@@ -107,6 +107,15 @@ pub fn export_pid(pid: &PidExport, form: PidForm) -> Result<String> {
     })
 }
 
+/// `b r - y` for a weight b of the reference.
+pub fn weighted_error(weight: f64) -> String {
+    match weight {
+        0.0 => "-y".into(),
+        1.0 => "r - y".into(),
+        _ => format!("{} r - y", number(weight)),
+    }
+}
+
 /// What every form says of itself, a line each.
 fn head(pid: &PidExport) -> Vec<String> {
     let unit = |c: &Channel| if c.unit.is_empty() { "its unit".to_owned() } else { plain(&c.unit) };
@@ -135,9 +144,9 @@ fn head(pid: &PidExport) -> Vec<String> {
     let [b, c] = pid.reference_weights;
     if [b, c] != [1.0; 2] {
         lines.push(format!(
-            "steps of the reference come out as promised where kp takes {} r - y and kd {} r - y, as in the running controller",
-            number(b),
-            number(c)
+            "steps of the reference come out as promised where kp takes {} and kd {}, as in the running controller",
+            weighted_error(b),
+            weighted_error(c)
         ));
     }
     if pid.delay > 0 {

@@ -3,6 +3,7 @@
 use super::decibels::decibel;
 use super::redesign::loops;
 use youla::identify::likelihood::figure as digits;
+use youla_io::export::weighted_error;
 use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep, ReferenceWeights};
 use youla_report::data::{self, DrawnMethod, EvidenceTable, LineStatus, MethodRole, ReportPart, Verdict};
 use youla_report::figure::{Area, Axis, Content, Curve, Figure, Layout, Panel};
@@ -141,7 +142,7 @@ fn of_reference(weights: Option<&[ReferenceWeights]>) -> String {
     let filter = "Overshoot after a step of the reference, upper end of the band; a filter of the reference with the time constant in the last \
                   column, w += ts / (ts + T) (r - w), keeps it to 10 % and changes nothing in the loop.";
     let weight = |w: &ReferenceWeights| {
-        format!("kp takes {} r - y and kd {} r - y", digits(w.proportional), digits(w.derivative))
+        format!("kp takes {} and kd {}", weighted_error(w.proportional), weighted_error(w.derivative))
     };
     match weights.iter().all(|w| *w == ReferenceWeights::ERROR) {
         true => filter.into(),

@@ -65,7 +65,8 @@ fn between(of_reference: &PidGains, own: &PidGains) -> Option<ReferenceWeights> 
     let weight = |of: f64, own: f64| match (of, own) {
         (0.0, 0.0) => Some(1.0),
         (_, 0.0) => None,
-        _ => Some(of / own),
+        // to the digits of the fit
+        _ => Some((1e6 * of / own).round() / 1e6),
     };
     let same = (of_reference.ki - own.ki).abs() <= SAME * own.ki.abs();
     let weights = || {

@@ -151,7 +151,7 @@ fn of_band(found: &Recommendation, lines: &[[Vec<c64>; 3]], hz: f64) -> Result<V
     let (of_u, of_v) = (along(&u), along(&v));
     let inverse = (&of_u * of_u.adjoint()).partial_piv_lu().inverse();
     let error = &of_v * of_u.adjoint() * &inverse;
-    let stated = found.region.at(hz).entries();
+    let stated = found.region.entry_errors(&[hz]).remove(0);
     let model = frequency_response(&found.plant, &[std::f64::consts::TAU * hz])?;
     let mut out = Vec::new();
     for i in 0..v.nrows() {

@@ -119,15 +119,39 @@ fn order_by_lines(signal: MatRef<'_, f64>, order: usize, rank: usize) -> Result<
     Ok(if rank as f64 >= INDEPENDENT * sum as f64 { least } else { 0 })
 }
 
-/// Lines within 60 dB of the largest: the maxima of each stretch of bins or, where it has hardly any, its bins but for a lobe.
+/// Frequency below which travel and drift may hide the lines of an excitation, a share of the sample rate, and the power of the rest over all from which
+/// it is no rounding of a log of five digits.
+const SLOW: f64 = 1e-3;
+const ROUNDED: f64 = 1e-8;
+
+/// Lines within 60 dB of the largest, of all or of those that are not slow.
 fn spectral_lines(values: &[f64]) -> usize {
+    let power = power_of(values);
+    // Second differences take travel away before the window spreads it over the lines.
+    let differences: Vec<f64> = values.windows(3).map(|v| v[2] - 2.0 * v[1] + v[0]).collect();
+    let first = (SLOW * values.len() as f64) as usize + 1;
+    let mut rest = power_of(&differences);
+    for (k, power) in rest.iter_mut().enumerate().skip(1) {
+        *power /= (2.0 - 2.0 * (TAU * k as f64 / differences.len() as f64).cos()).powi(2);
+    }
+    let rest = rest.get(first..).unwrap_or_default();
+    let beyond_rounding = rest.iter().sum::<f64>() > ROUNDED * power.iter().sum::<f64>();
+    lines_of(&power).max(if beyond_rounding { lines_of(rest) } else { 0 })
+}
+
+/// Power of the lines under the window of Blackman and Harris, up to the Nyquist frequency.
+fn power_of(values: &[f64]) -> Vec<f64> {
     let n = values.len();
     let turn = |k: usize, times: f64| (TAU * times * k as f64 / n as f64).cos();
     let window = |k: usize| 0.358_75 - 0.488_29 * turn(k, 1.0) + 0.141_28 * turn(k, 2.0) - 0.011_68 * turn(k, 3.0);
     let mut buffer: Vec<Complex<f64>> =
         values.iter().enumerate().map(|(k, v)| Complex::new(v * window(k), 0.0)).collect();
     FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
-    let power: Vec<f64> = buffer[..n / 2].iter().map(|z| z.norm_sqr()).collect();
+    buffer[..n / 2].iter().map(|z| z.norm_sqr()).collect()
+}
+
+/// Lines within 60 dB of the largest: the maxima of each stretch of bins or, where it has hardly any, its bins but for a lobe.
+fn lines_of(power: &[f64]) -> usize {
     let least = EMPTY * power.iter().copied().fold(0.0, f64::max);
     let (mut lines, mut bins, mut maxima) = (0, 0, 0);
     for k in 1..power.len() {
@@ -234,6 +258,20 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
     use youla::Mat;
+
+    /// A multisine beside the path of a ramp through an integrator is as rich as alone; the path alone is not.
+    #[test]
+    fn travel_does_not_hide_the_lines_of_an_excitation() {
+        let (turn, n) = (TAU / 8000.0, 20_000);
+        let sines = |k: usize| (20..=400).step_by(4).map(|l| (turn * (l * k + l * l) as f64).sin()).sum::<f64>();
+        let travel = |k: usize| 1e4 * (k as f64 / n as f64).powi(2);
+        let lines = |of: &dyn Fn(usize) -> f64| {
+            let signal = Mat::from_fn(n, 1, |k, _| of(k));
+            excitation(signal.as_ref(), Discrete::new(1e-3).unwrap(), 40).unwrap().by_lines
+        };
+        assert!(lines(&|k| sines(k) + travel(k)) >= 40);
+        assert!(lines(&travel) < 20, "{}", lines(&travel));
+    }
 
     #[test]
     fn noise_is_enough_and_a_short_register_is_not() {

@@ -11,10 +11,11 @@ use rustfft::{Fft, FftPlanner};
 /// A function of an input in units of its size, or of the velocity that it causes.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
-    /// Of an output that is a position. The two kinds of friction come first, so that the rest is what friction does not explain.
-    Friction,
+    /// Of an output that is a position, so many samples later: a dead time that the model has among its states is none of the friction. The kinds of
+    /// friction come first, so that the rest is what friction does not explain.
+    Friction(usize),
     /// Of an output that is a velocity.
-    FrictionAtSpeed,
+    FrictionAtSpeed(usize),
     Smooth(&'static str, fn(f64) -> f64),
     /// What a limit takes away, `u - clamp(u)`; with the limit below the input, what a dead zone lets pass.
     Beyond(f64),
@@ -27,8 +28,11 @@ const SMALL_VELOCITY: f64 = 0.1;
 /// Time constants of a plant that a record holds at least where its output may be a velocity: an output that integrates the input for longer is
 /// a position, whose sign follows slow loads.
 const TIME_CONSTANTS: f64 = 10.0;
+/// Samples that friction may come before what the model has of it, below the dead time of its input: beyond it the motion rests on what the feedback
+/// makes of the noise that the function is to explain.
+const LEADS: usize = 3;
 /// Kinds of friction.
-pub(super) const FRICTIONS: usize = 2;
+pub(super) const FRICTIONS: usize = 2 * LEADS;
 /// Limits that are tried first, and those of which the most significant is taken where a function of the input explains too much of the output:
 /// from a dead zone of a twentieth of the input to a limit that one sample in 700 of normal noise exceeds. What a limit between two of them
 /// takes away is nearly a sum of what both take.
@@ -43,14 +47,14 @@ impl Shape {
             Shape::Smooth("u^2", |u| u * u),
         ];
         let beyond = limits.iter().map(|limit| Shape::Beyond(*limit));
-        let frictions: [Self; FRICTIONS] = [Shape::Friction, Shape::FrictionAtSpeed];
-        frictions.into_iter().chain(smooth).chain(beyond).chain([Shape::Backlash]).collect()
+        let frictions = (0..LEADS).flat_map(|lead| [Shape::Friction(lead), Shape::FrictionAtSpeed(lead)]);
+        frictions.chain(smooth).chain(beyond).chain([Shape::Backlash]).collect()
     }
 
     pub(super) fn name(self) -> String {
         match self {
-            Shape::Friction => "dry friction".into(),
-            Shape::FrictionAtSpeed => "dry friction, the output being a speed".into(),
+            Shape::Friction(_) => "dry friction".into(),
+            Shape::FrictionAtSpeed(_) => "dry friction, the output being a speed".into(),
             Shape::Smooth(name, _) => name.into(),
             Shape::Beyond(limit) if limit < 0.5 => format!("a dead zone of {limit} deviations"),
             Shape::Beyond(limit) => format!("saturation at {limit} deviations"),
@@ -60,11 +64,66 @@ impl Shape {
 
     fn of(self, value: f64) -> f64 {
         match self {
-            Shape::Friction | Shape::FrictionAtSpeed | Shape::Backlash => (value / SMALL_VELOCITY).tanh(),
+            Shape::Friction(_) | Shape::FrictionAtSpeed(_) | Shape::Backlash => (value / SMALL_VELOCITY).tanh(),
             Shape::Smooth(_, f) => f(value),
             Shape::Beyond(limit) => value - value.clamp(-limit, limit),
         }
     }
+
+    /// Of friction and play, whether they are functions of an output itself, and not of its differences.
+    pub(super) fn moves(self) -> Option<bool> {
+        match self {
+            Shape::Friction(_) | Shape::Backlash => Some(false),
+            Shape::FrictionAtSpeed(_) => Some(true),
+            Shape::Smooth(..) | Shape::Beyond(_) => None,
+        }
+    }
+
+    /// The function of its signal at a sample: of a velocity, friction takes that over the sample in which the input is held, play that before.
+    fn at(self, signal: &[f64], t: usize) -> f64 {
+        let place = match self {
+            Shape::Friction(lead) | Shape::FrictionAtSpeed(lead) => (t + lead).min(signal.len() - 1),
+            Shape::Backlash => t.saturating_sub(1),
+            Shape::Smooth(..) | Shape::Beyond(_) => t,
+        };
+        self.of(signal[place])
+    }
+}
+
+/// The motion of which friction or play is a function.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Motion {
+    pub(super) output: usize,
+    /// Whether it is that output itself, not its differences.
+    pub(super) at_speed: bool,
+}
+
+impl Motion {
+    /// Its gain from the output at a frequency, a share of the sample rate.
+    pub(super) fn gain(self, share: f64) -> f64 {
+        if self.at_speed { 1.0 } else { 2.0 * (std::f64::consts::PI * share).sin() }
+    }
+}
+
+/// The lines of a motion in a record.
+pub(super) fn lines_of_motion(
+    (lines, clean): (&Lines, &Vec<c64>),
+    (model, p): (&Model, usize),
+    of: Motion,
+) -> Vec<c64> {
+    let moved = if grows(model) { &lines.y } else { clean };
+    let mut planner = FftPlanner::new();
+    let (scale, y) = in_time(lines, &mut planner, |k| moved[k * p + of.output]);
+    let (size, v) = if of.at_speed { (1.0, y) } else { velocity(&y) };
+    let (fft, size) = (planner.plan_fft_forward(lines.samples), scale * size / (lines.samples as f64).sqrt());
+    let [found, _] = lines_of_two(&*fft, lines.samples, |t| c64::new(size * v[t], 0.0));
+    found
+}
+
+/// What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
+fn grows(model: &Model) -> bool {
+    model.poles().iter().any(|p| p.norm() > 1.0)
 }
 
 /// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
@@ -82,7 +141,7 @@ pub(super) struct Shaped {
 /// The functions of one record seen through the model, lines x p x functions.
 pub(super) fn columns(
     spectra: &Spectra,
-    (model, shapes): (&Model, &[Shape]),
+    (model, delays, shapes): (&Model, &[usize], &[Shape]),
     lines: &Lines,
     (clean, time): (&[c64], &dyn Fn(usize) -> f64),
     planner: &mut FftPlanner<f64>,
@@ -92,8 +151,7 @@ pub(super) fn columns(
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
     let (mut sizes, mut plain, mut moved_most) = (vec![0.0; drift], vec![Vec::new(); drift], vec![0; m]);
-    // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
-    let grows = model.poles().iter().any(|p| p.norm() > 1.0);
+    let grows = grows(model);
     let moved = if grows { &lines.y } else { clean };
     let integrates = model.poles().iter().any(|p| p.norm().ln().abs() * (lines.samples as f64) < TIME_CONSTANTS);
     let root = (lines.samples as f64).sqrt();
@@ -109,21 +167,24 @@ pub(super) fn columns(
         let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
         let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
         moved_most[j] = seen;
-        let mut output =
-            |y: &[c64], of: fn(c64) -> c64| in_time(lines, planner, |k| y[k * p + seen] * of(lines.z[k])).1;
-        let velocity: fn(c64) -> c64 = |z| c64::ONE - z.conj();
-        let without_noise = output(clean, velocity);
-        let measured = grows.then(|| output(moved, velocity));
-        let speed = output(moved, |_| c64::ONE);
+        let mut output = |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen]).1;
+        let without_noise = velocity(&output(clean)).1;
+        let speed = output(moved);
+        // Of a measured output the difference to the next sample has noise that the function is to explain.
+        let measured = grows.then(|| {
+            let mut velocity = velocity(&speed).1;
+            velocity.rotate_right(1);
+            velocity
+        });
         let base = |shape: Shape| match shape {
-            Shape::Friction => measured.as_ref().unwrap_or(&without_noise),
-            Shape::FrictionAtSpeed => &speed,
+            Shape::Friction(_) => measured.as_ref().unwrap_or(&without_noise),
+            Shape::FrictionAtSpeed(_) => &speed,
             Shape::Backlash => &without_noise,
             _ => &u,
         };
         let pairs = shapes.par_chunks(2).map(|pair| {
-            let second = |t: usize| pair.get(1).map_or(0.0, |shape| shape.of(base(*shape)[t]));
-            lines_of_two(&*fft, lines.samples, |t| c64::new(pair[0].of(base(pair[0])[t]), second(t)))
+            let second = |t: usize| pair.get(1).map_or(0.0, |shape| shape.at(base(*shape), t));
+            lines_of_two(&*fft, lines.samples, |t| c64::new(pair[0].at(base(pair[0]), t), second(t)))
         });
         let pairs: Vec<[Vec<c64>; 2]> = pairs.collect();
         for (f, (shape, of_shape)) in shapes.iter().zip(pairs.into_iter().flatten()).enumerate() {
@@ -134,7 +195,9 @@ pub(super) fn columns(
                 let column = |i: usize| (k * p + i) * count + f;
                 match shape {
                     Shape::Backlash => columns[column(seen)] = of_shape[k],
-                    Shape::FrictionAtSpeed if integrates => {}
+                    Shape::FrictionAtSpeed(_) if integrates => {}
+                    Shape::Friction(lead) | Shape::FrictionAtSpeed(lead)
+                        if *lead > if grows { 0 } else { delays[j] } => {}
                     _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * of_shape[k]),
                 }
             }
@@ -144,14 +207,29 @@ pub(super) fn columns(
     Shaped { columns, sizes, plain, moved_most }
 }
 
-/// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.
+/// Root mean square of a signal without its mean and its part along another one.
 fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let (mut count, mut mean, mut square, mut along) = (0.0, 0.0, 0.0, 0.0);
+    let (mut count, mut means, mut squares, mut along) = (0.0, [0.0; 2], [0.0; 2], 0.0);
     for (value, base) in pairs {
-        (count, mean, square, along) = (count + 1.0, mean + value, square + value * value, along + value * base);
+        count += 1.0;
+        means = [means[0] + value, means[1] + base];
+        squares = [squares[0] + value * value, squares[1] + base * base];
+        along += value * base;
     }
     let count = f64::max(count, 1.0);
-    (square / count - (mean / count).powi(2) - (along / count).powi(2)).max(0.0).sqrt()
+    let power = |k: usize| squares[k] / count - (means[k] / count).powi(2);
+    let along = along / count - means[0] * means[1] / (count * count);
+    (power(0) - along * along / power(1).max(TINY)).max(0.0).sqrt()
+}
+
+/// Differences of neighbours, their size, and they themselves of unit size, with their mean: that from the last sample to the first is no motion, and in a record of travel larger
+/// than all others together. Each is that of the sample that begins.
+fn velocity(y: &[f64]) -> (f64, Vec<f64>) {
+    let mut v: Vec<f64> = y.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    v.push(v.last().copied().unwrap_or(0.0));
+    let size = (v.iter().map(|v| v * v).sum::<f64>() / v.len() as f64).sqrt().max(TINY);
+    v.iter_mut().for_each(|v| *v /= size);
+    (size, v)
 }
 
 /// Lines of two signals, the real and the imaginary parts of `both`, from the first above zero, over the root of their number of samples.
@@ -162,7 +240,7 @@ fn lines_of_two(fft: &dyn Fft<f64>, samples: usize, both: impl Fn(usize) -> c64)
     (1..=samples / 2).map(|k| <(c64, c64)>::from(of_two_real(&work, k, half))).unzip().into()
 }
 
-/// Size of a signal and the signal in time from its lines, without its mean and of unit size.
+/// Size of a signal times the root of its number of samples, and the signal in time from its lines, without its mean and of unit size.
 fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) -> c64) -> (f64, Vec<f64>) {
     let samples = lines.samples;
     let mut work = vec![c64::ZERO; samples];

@@ -8,10 +8,10 @@
 //! b = tanh(velocity / small). A drift of the gain has x from -1 to 1 over the records. theta, beta and delta are estimated together with the
 //! parameters of the model, to which the linear and constant parts belong.
 
-use super::functions::{FINE_LIMITS, FRICTIONS, LIMITS, Shape, Shaped, columns};
+use super::functions::{FINE_LIMITS, FRICTIONS, LIMITS, Motion, Shape, Shaped, columns, lines_of_motion};
 use super::limits::{
-    BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LARGEST_PLAY,
-    LASTING,
+    BAND_LINES, BAND_RATIO, BEYOND_CHANCE, FRICTION_ELSEWHERE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR,
+    LARGEST_OF_INPUT, LARGEST_PLAY, LASTING,
 };
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
@@ -50,30 +50,56 @@ impl Channel {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct NonlinearPart {
     channel: Channel,
-    /// Middles of bands as shares of the sample rate, power of this part, and of the channel.
-    bands: Vec<[f64; 3]>,
+    /// What of it no response to the channel gives, beside the channel.
+    rest: Bands,
+    /// Of friction and play, what a response to the motion gives.
+    linear: Option<Equivalent>,
 }
 
-impl NonlinearPart {
-    /// Bands of 40 lines: of `c f` what no response to the channel gives. `parts` holds for each record the lines of f and those of all inputs or
-    /// outputs, of which there are `channels`.
-    fn new(channel: Channel, c: f64, parts: &[(&[c64], &[c64])], channels: usize) -> Self {
-        let lines = parts.iter().map(|(f, _)| f.len()).min().unwrap_or(0);
+/// The linear function of a motion v that stands for friction or play, `c f = k v`: the model has it as if it belonged to the linear plant, and at
+/// another amplitude it is another.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Equivalent {
+    motion: Motion,
+    /// k^2 v^2, beside v^2.
+    bands: Bands,
+}
+
+/// Middles of bands of 40 lines as shares of the sample rate, with the power of two signals in each.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Bands(Vec<[f64; 3]>);
+
+impl Bands {
+    /// Powers of what `of` makes of the power of f, its product with x and the power of x, beside that of x. `pairs` holds the lines of both for each
+    /// record, those of x among several channels.
+    fn new(pairs: &[(&[c64], &[c64])], (place, channels): (usize, usize), of: impl Fn(f64, c64, f64) -> f64) -> Self {
+        let lines = pairs.iter().map(|(f, _)| f.len()).min().unwrap_or(0);
         let count = (lines / BAND_LINES).max(1);
         let mut sums = vec![(0.0, c64::ZERO, 0.0); count];
-        for (f, x) in parts {
+        for (f, x) in pairs {
             let total = f.len();
             for (k, f) in f.iter().enumerate() {
-                let (sum, x) = (&mut sums[(k * count / total).min(count - 1)], x[k * channels + channel.place()]);
+                let (sum, x) = (&mut sums[(k * count / total).min(count - 1)], x[k * channels + place]);
                 *sum = (sum.0 + f.norm_sqr(), sum.1 + f * x.conj(), sum.2 + x.norm_sqr());
             }
         }
-        let band = |(k, (f, fx, x)): (usize, (f64, c64, f64))| {
-            [0.5 * (k as f64 + 0.5) / count as f64, c * c * (f - fx.norm_sqr() / x.max(TINY)).max(0.0), x]
-        };
-        NonlinearPart { channel, bands: sums.into_iter().enumerate().map(band).collect() }
+        let band = |(k, (f, fx, x)): (usize, (f64, c64, f64))| [0.5 * (k as f64 + 0.5) / count as f64, of(f, fx, x), x];
+        Bands(sums.into_iter().enumerate().map(band).collect())
     }
 
+    /// The first power over the second, over a third of an octave.
+    fn ratio(&self, share: f64) -> f64 {
+        let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
+        let first = self.0.partition_point(|b| b[0] < from).min(self.0.len() - 1);
+        let end = self.0.partition_point(|b| b[0] <= to).max(first + 1);
+        let sum = |k: usize| self.0[first..end].iter().map(|b| b[k]).sum::<f64>();
+        sum(1) / sum(2).max(TINY)
+    }
+}
+
+impl NonlinearPart {
     /// Whether it is that of a plant with so many outputs and inputs.
     #[cfg(feature = "serde")]
     pub(crate) fn is_of(&self, (outputs, inputs): (usize, usize)) -> bool {
@@ -81,28 +107,35 @@ impl NonlinearPart {
             Channel::Input(_) => inputs,
             Channel::Output(_) => outputs,
         };
-        self.channel.place() < channels && !self.bands.is_empty()
+        let of_motion = |of: &Equivalent| of.motion.output < outputs && !of.bands.0.is_empty();
+        self.channel.place() < channels && !self.rest.0.is_empty() && self.linear.as_ref().is_none_or(of_motion)
     }
 
     /// Adds the mean square of the error of the response that stays of it at a frequency, a share of the sample rate, to those of the entries
     /// (p x m) of the response g.
     pub(crate) fn add(&self, share: f64, errors: &mut [f64], inputs: usize, g: &[c64]) {
-        let ratio = self.near(share);
+        self.add_relative(LASTING * self.rest.ratio(share), errors, inputs, g);
+    }
+
+    /// The same of what a linear function of the motion gives, which the model has as if it belonged to the plant without friction or play.
+    pub(crate) fn add_linear(&self, share: f64, errors: &mut [f64], inputs: usize, g: &[c64]) {
+        let Some(of) = &self.linear else { return };
+        let per_channel = match self.channel {
+            Channel::Input(input) => FRICTION_ELSEWHERE * g[of.motion.output * inputs + input].norm_sqr(),
+            Channel::Output(_) => 1.0,
+        };
+        let relative = of.bands.ratio(share) * per_channel * of.motion.gain(share).powi(2);
+        self.add_relative(relative, errors, inputs, g);
+    }
+
+    /// Adds a mean square of the error relative to the response to the entries of the channel.
+    fn add_relative(&self, relative: f64, errors: &mut [f64], inputs: usize, g: &[c64]) {
         let of_channel = |entry: usize| match self.channel {
             Channel::Input(input) => entry % inputs == input,
             Channel::Output(output) => entry / inputs == output,
         };
         let moved = errors.iter_mut().enumerate().filter(|(entry, _)| of_channel(*entry));
-        moved.for_each(|(entry, error)| *error += g[entry].norm_sqr() * ratio);
-    }
-
-    /// Mean square of the error of the response that stays of it, relative to the response, over a third of an octave.
-    fn near(&self, share: f64) -> f64 {
-        let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
-        let first = self.bands.partition_point(|b| b[0] < from).min(self.bands.len() - 1);
-        let end = self.bands.partition_point(|b| b[0] <= to).max(first + 1);
-        let sum = |k: usize| self.bands[first..end].iter().map(|b| b[k]).sum::<f64>();
-        LASTING * sum(1) / sum(2).max(TINY)
+        moved.for_each(|(entry, error)| *error += g[entry].norm_sqr() * relative);
     }
 }
 
@@ -177,7 +210,8 @@ impl<'a> Beside<'a> {
         let mut records: Vec<Shaped> = pairs
             .map(|(lines, clean)| {
                 let time = |t: usize| 2.0 * (first + t) as f64 / total as f64 - 1.0;
-                let found = columns(spectra, (model, &shapes), lines, (clean, &time), &mut planner);
+                let found =
+                    columns(spectra, (model, &solution.chosen.delays, &shapes), lines, (clean, &time), &mut planner);
                 first += lines.samples;
                 found
             })
@@ -267,16 +301,29 @@ impl<'a> Beside<'a> {
     /// What a function with its coefficient adds to its channel.
     fn part(&self, f: usize, c: f64) -> NonlinearPart {
         let (m, p) = (self.spectra.inputs, self.spectra.outputs);
-        let (channel, channels) = match self.records.first() {
-            Some(shaped) if !self.at_inputs().contains(&f) => (Channel::Output(shaped.moved_most[f % m]), p),
-            _ => (Channel::Input(f % m), m),
+        let seen = self.records.first().map_or(0, |shaped| shaped.moved_most[f % m]);
+        let (channel, channels) = match self.at_inputs().contains(&f) {
+            false => (Channel::Output(seen), p),
+            true => (Channel::Input(f % m), m),
         };
         let all = self.spectra.records.iter().zip(&self.clean).map(|(lines, clean)| match channel {
             Channel::Input(_) => &lines.u[..],
             Channel::Output(_) => &clean[..],
         });
-        let parts: Vec<(&[c64], &[c64])> = self.records.iter().map(|shaped| &shaped.plain[f][..]).zip(all).collect();
-        NonlinearPart::new(channel, c, &parts, channels)
+        let plain = || self.records.iter().map(|shaped| &shaped.plain[f][..]);
+        let pairs: Vec<(&[c64], &[c64])> = plain().zip(all).collect();
+        let rest = Bands::new(&pairs, (channel.place(), channels), |f, fx, x| {
+            c * c * (f - fx.norm_sqr() / x.max(TINY)).max(0.0)
+        });
+        let linear = self.shapes[f / m].moves().map(|at_speed| {
+            let motion = Motion { output: seen, at_speed };
+            let pairs = self.spectra.records.iter().zip(&self.clean);
+            let lines: Vec<Vec<c64>> = pairs.map(|of| lines_of_motion(of, (self.model, p), motion)).collect();
+            let pairs: Vec<(&[c64], &[c64])> = plain().zip(lines.iter().map(Vec::as_slice)).collect();
+            let bands = Bands::new(&pairs, (0, 1), |_, fx, x| c * c * fx.norm_sqr() / x.max(TINY));
+            Equivalent { motion, bands }
+        });
+        NonlinearPart { channel, rest, linear }
     }
 }
 

@@ -205,7 +205,7 @@ impl Directions {
         })
     }
 
-    /// The error of the response, scaled channels.
+    /// The error of the response, scaled channels, under the friction and the play of the records: the loop ran with both.
     pub(crate) fn at(&self, share: f64) -> ResponseError {
         let Columns { parameters, rivals, variation, distortion, .. } = self.columns(share);
         // What the excitation shows of an error is its size, not its phase.
@@ -217,9 +217,18 @@ impl Directions {
         ResponseError { shared, alone, ..parameters }
     }
 
-    /// Mean squares of the error of each entry by their causes.
+    /// The same, also against the plant without them.
+    pub(crate) fn against_linear(&self, share: f64) -> ResponseError {
+        let mut error = self.at(share);
+        let g = delayed(&self.model, &self.delays, share);
+        self.nonlinear.iter().for_each(|part| part.add_linear(share, &mut error.alone, self.model.inputs, &g));
+        error
+    }
+
+    /// Mean squares of the error of each entry by their causes, also against the plant without the friction and the play of the records.
     pub(crate) fn parts(&self, share: f64) -> Parts {
-        let Columns { g, parameters, squares, rivals, variation, distortion } = self.columns(share);
+        let Columns { g, parameters, squares, rivals, variation, mut distortion } = self.columns(share);
+        self.nonlinear.iter().for_each(|part| part.add_linear(share, &mut distortion, self.model.inputs, &g));
         let squares = self.finite(share, &g, &parameters, &squares);
         let noise: Vec<f64> = squares.iter().map(|square| square / self.scatter).collect();
         let choice = |i: usize| (0..rivals.ncols()).map(|k| rivals[(i, k)].norm_sqr()).sum::<f64>();

@@ -140,17 +140,26 @@ impl Region {
         ChannelScales::new(self.sizes.u.clone(), self.sizes.y.clone())
     }
 
-    /// The error at a frequency, Hz, up to that of Nyquist, by the errors of the parameters: also beyond `hz`, as below the lowest frequency
+    /// The error in the loop that ran, with the friction and the play of its machine, at a frequency, Hz, up to that of Nyquist, by the errors of the parameters: also beyond `hz`, as below the lowest frequency
     /// of a record, where a slow pole moves the response most. What the excitation shows beyond the parameters is that of the nearest band.
     pub fn at(&self, hz: f64) -> ResponseError {
-        let share = (hz * self.time.ts()).clamp(0.0, 0.5);
-        let Sizes { u, y } = &self.sizes;
-        self.directions.at(share).scaled(|i, j| c64::new(y[i] / u[j], 0.0))
+        self.in_units(self.directions.at(self.share(hz)))
     }
 
-    /// The errors of the entries at frequencies, Hz: what [`Self::at`] says of each entry by itself.
+    /// The errors of the entries at frequencies, Hz, those of `absolute`: against the plant without friction and play, whose linear parts the model
+    /// holds.
     pub fn entry_errors(&self, hz: &[f64]) -> Vec<EntryErrors> {
-        hz.par_iter().map(|hz| self.at(*hz).entries()).collect()
+        hz.par_iter().map(|hz| self.in_units(self.directions.against_linear(self.share(*hz))).entries()).collect()
+    }
+
+    fn share(&self, hz: f64) -> f64 {
+        (hz * self.time.ts()).clamp(0.0, 0.5)
+    }
+
+    /// An error of scaled channels in physical units.
+    fn in_units(&self, error: ResponseError) -> ResponseError {
+        let Sizes { u, y } = &self.sizes;
+        error.scaled(|i, j| c64::new(y[i] / u[j], 0.0))
     }
 
     /// Intervals of figures of the plant, in the order in which `of` gives them, by the delta method: central differences along

@@ -11,8 +11,8 @@ use rustfft::{Fft, FftPlanner};
 /// A function of an input in units of its size, or of the velocity that it causes.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
-    /// Of an output that is a position, so many samples later: a dead time that the model has among its states is none of the friction. The kinds of
-    /// friction come first, so that the rest is what friction does not explain.
+    /// Of an output that is a position, so many samples later: a dead time that the model has among its states is none of the friction. Those
+    /// without a lead come first, so that the rest is what friction does not explain.
     Friction(usize),
     /// Of an output that is a velocity.
     FrictionAtSpeed(usize),
@@ -31,8 +31,9 @@ const TIME_CONSTANTS: f64 = 10.0;
 /// Samples that friction may come before what the model has of it, below the dead time of its input: beyond it the motion rests on what the feedback
 /// makes of the noise that the function is to explain.
 const LEADS: usize = 3;
-/// Kinds of friction.
-pub(super) const FRICTIONS: usize = 2 * LEADS;
+/// Kinds of friction without a lead, and with one.
+pub(super) const FRICTIONS: usize = 2;
+pub(super) const EARLIER: usize = 2 * (LEADS - 1);
 /// Limits that are tried first, and those of which the most significant is taken where a function of the input explains too much of the output:
 /// from a dead zone of a twentieth of the input to a limit that one sample in 700 of normal noise exceeds. What a limit between two of them
 /// takes away is nearly a sum of what both take.
@@ -47,8 +48,9 @@ impl Shape {
             Shape::Smooth("u^2", |u| u * u),
         ];
         let beyond = limits.iter().map(|limit| Shape::Beyond(*limit));
-        let frictions = (0..LEADS).flat_map(|lead| [Shape::Friction(lead), Shape::FrictionAtSpeed(lead)]);
-        frictions.chain(smooth).chain(beyond).chain([Shape::Backlash]).collect()
+        let frictions = |lead| [Shape::Friction(lead), Shape::FrictionAtSpeed(lead)];
+        let earlier = (1..LEADS).flat_map(frictions);
+        frictions(0).into_iter().chain(smooth).chain(beyond).chain(earlier).chain([Shape::Backlash]).collect()
     }
 
     pub(super) fn name(self) -> String {

@@ -8,7 +8,7 @@
 //! b = tanh(velocity / small). A drift of the gain has x from -1 to 1 over the records. theta, beta and delta are estimated together with the
 //! parameters of the model, to which the linear and constant parts belong.
 
-use super::functions::{FINE_LIMITS, FRICTIONS, LIMITS, Motion, Shape, Shaped, columns, lines_of_motion};
+use super::functions::{EARLIER, FINE_LIMITS, FRICTIONS, LIMITS, Motion, Shape, Shaped, columns, lines_of_motion};
 use super::limits::{
     BAND_LINES, BAND_RATIO, BEYOND_CHANCE, FRICTION_ELSEWHERE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR,
     LARGEST_OF_INPUT, LARGEST_PLAY, LASTING,
@@ -260,9 +260,9 @@ impl<'a> Beside<'a> {
 
     /// What the functions of the inputs explain of the output beyond friction and a known one.
     fn unknown(&self, known: Option<usize>) -> Evidence {
-        let first = FRICTIONS * self.spectra.inputs;
+        let (first, last) = (FRICTIONS * self.spectra.inputs, self.at_inputs().end - EARLIER * self.spectra.inputs);
         let distinct = |i: &usize| self.factor[(*i, *i)].powi(2) > DISTINCT * self.lengths[*i];
-        let behind: Vec<usize> = (first..self.at_inputs().end.min(self.factor.nrows())).filter(distinct).collect();
+        let behind: Vec<usize> = (first..last.min(self.factor.nrows())).filter(distinct).collect();
         let residual = self.drift() + 1;
         let all: f64 = behind.iter().map(|i| self.factor[(*i, residual)].powi(2)).sum();
         let of_known = known.filter(|f| *f >= first).and_then(|f| self.along(f, first));

@@ -114,7 +114,7 @@ pub(super) fn lines_of_motion(
     (model, p): (&Model, usize),
     of: Motion,
 ) -> Vec<c64> {
-    let moved = if grows(model) { &lines.y } else { clean };
+    let moved = if grows(model, lines.samples) { &lines.y } else { clean };
     let mut planner = FftPlanner::new();
     let (scale, y) = in_time(lines, &mut planner, |k| moved[k * p + of.output]);
     let (size, v) = if of.at_speed { (1.0, y) } else { velocity(&y) };
@@ -123,9 +123,10 @@ pub(super) fn lines_of_motion(
     found
 }
 
-/// What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
-fn grows(model: &Model) -> bool {
-    model.poles().iter().any(|p| p.norm() > 1.0)
+/// What the model of an unstable plant makes of u rests on later samples too, which depend on the noise. A pole that grows by less than e^3 over the
+/// record is an integrator.
+fn grows(model: &Model, samples: usize) -> bool {
+    model.poles().iter().any(|p| p.norm().ln() * samples as f64 > 3.0)
 }
 
 /// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
@@ -153,7 +154,7 @@ pub(super) fn columns(
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
     let (mut sizes, mut plain, mut moved_most) = (vec![0.0; drift], vec![Vec::new(); drift], vec![0; m]);
-    let grows = grows(model);
+    let grows = grows(model, lines.samples);
     let moved = if grows { &lines.y } else { clean };
     let integrates = model.poles().iter().any(|p| p.norm().ln().abs() * (lines.samples as f64) < TIME_CONSTANTS);
     let root = (lines.samples as f64).sqrt();

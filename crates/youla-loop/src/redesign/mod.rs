@@ -227,9 +227,10 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
                 candidates,
             });
         }
-        tried[k].0.refused = band.map(|b| match b.impossible <= b.models {
-            true => format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within),
-            false => contradicted(b.impossible, b.models),
+        tried[k].0.refused = band.map(|b| {
+            let unstable =
+                || format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within);
+            contradicted(b.impossible, b.models).unwrap_or_else(unstable)
         });
     }
     let reasons: Vec<String> =
@@ -237,12 +238,12 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
     Err(Error::NoRedesign { reasons: reasons.join("; ") })
 }
 
-/// Why models that are left of a region prove nothing.
-fn contradicted(impossible: usize, models: usize) -> String {
+/// Why models that are left of a region prove nothing, where they are less than half.
+fn contradicted(impossible: usize, models: usize) -> Option<String> {
     let all = impossible + models;
-    format!(
-        "the running controller does not stabilise {impossible} of {all} models of the region, which the log contradicts"
-    )
+    (impossible > models).then(|| {
+        format!("the running controller does not stabilise {impossible} of {all} models of the region, which the log contradicts")
+    })
 }
 
 fn check(options: &RedesignOptions) -> Result<()> {

@@ -96,8 +96,8 @@ impl PidRedesign {
         if !self.trusted {
             reasons.push("the model is not trusted, and what is proved on its region may not hold".to_owned());
         }
-        if p.impossible > p.models {
-            reasons.push(super::contradicted(p.impossible, p.models));
+        if let Some(reason) = super::contradicted(p.impossible, p.models) {
+            reasons.push(reason);
         } else if !p.holds() {
             reasons.push(format!(
                 "of {} fresh models of the region {} are unstable and {} miss a limit",

@@ -5,6 +5,7 @@
 //! ```
 //! b and c are those of the running controller; the new gains are promised with the same. Where the derivative acts on y alone, c = 0.
 
+use super::channels::{couples, each};
 use super::pid::{PidController, PidGains};
 use super::recognise::recognise;
 use super::scenarios::Grid;
@@ -50,7 +51,7 @@ pub(super) fn weights(
     gains: &[Option<PidController>],
 ) -> Result<Option<Vec<ReferenceWeights>>> {
     let Some(path) = path else { return Ok(Some(vec![ReferenceWeights::ERROR; gains.len()])) };
-    if path.outputs() != gains.len() || path.inputs() != gains.len() || super::couples(path)? {
+    if path.outputs() != gains.len() || path.inputs() != gains.len() || couples(path)? {
         return Ok(None);
     }
     let of_loop = |(path, gains): (StateSpace<Discrete>, &Option<PidController>)| {
@@ -58,7 +59,7 @@ pub(super) fn weights(
         let of_reference = recognise(grid, &path.negated(), &[own.gains.discretisation], own.delay)?;
         Ok(of_reference.and_then(|of| between(&of.gains, &own.gains)))
     };
-    super::each(path)?.into_iter().zip(gains).map(of_loop).collect()
+    each(path)?.into_iter().zip(gains).map(of_loop).collect()
 }
 
 fn between(of_reference: &PidGains, own: &PidGains) -> Option<ReferenceWeights> {

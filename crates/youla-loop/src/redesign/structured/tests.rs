@@ -185,19 +185,21 @@ fn identified_under(
     recommend(&[Experiment::new(u, y)], &[], None, time(), &options).unwrap()
 }
 
+/// A trusted model of the machine that a controller of the error ran, without dead time.
+fn of_model<'a>(
+    model: &'a youla::identify::likelihood::Recommendation,
+    running: &'a StateSpace<Discrete>,
+) -> PidProblem<'a> {
+    PidProblem { points: vec![(&model.plant, &model.region)], running, delay: 0, reference: None, trusted: true }
+}
+
 /// The seeded promise: designed on a model, the limits hold on the machine itself, and the proof on fresh draws holds. The same on one thread
 /// as on two.
 #[test]
 fn what_is_promised_holds_on_the_machine() {
     let model = identified(8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem {
-        points: vec![(&model.plant, &model.region)],
-        running: &k,
-        delay: 0,
-        reference: None,
-        trusted: true,
-    };
+    let problem = of_model(&model, &k);
     let options = PidOptions { notches: 1, command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -229,8 +231,7 @@ fn a_reference_with_weights_steps_as_promised() {
     let k = own.system(time()).unwrap();
     let weighed = |of: &PidGains| PidGains { kp: 0.7 * of.kp, kd: 0.0, ..*of }.system(time()).unwrap();
     let reference = Some(weighed(&own.gains));
-    let problem =
-        PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0, reference, trusted: true };
+    let problem = PidProblem { reference, ..of_model(&model, &k) };
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let new = design_pid(&problem, &options, &band).unwrap();
@@ -285,13 +286,7 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
     let plant = pair(0.3);
     let k = whole(&[running(), running()], time()).unwrap();
     let model = identified_under(&plant, &k, vec![1, 1], 8);
-    let problem = PidProblem {
-        points: vec![(&model.plant, &model.region)],
-        running: &k,
-        delay: 0,
-        reference: None,
-        trusted: true,
-    };
+    let problem = of_model(&model, &k);
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let new = design_pid(&problem, &options, &band).unwrap();
@@ -312,13 +307,7 @@ fn each_loop_of_a_square_machine_gets_its_pid() {
 fn a_refusal_names_the_limit() {
     let model = identified(-8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem {
-        points: vec![(&model.plant, &model.region)],
-        running: &k,
-        delay: 0,
-        reference: None,
-        trusted: true,
-    };
+    let problem = of_model(&model, &k);
     let band = BandOptions { draws: 30, seed: 1 };
     let refusal = |options: PidOptions| design_pid(&problem, &options, &band).err().unwrap().to_string();
     let late = refusal(PidOptions { delay_margin: 1.0, ..PidOptions::default() });

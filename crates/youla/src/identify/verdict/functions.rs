@@ -72,11 +72,11 @@ impl Shape {
         }
     }
 
-    /// Of friction and play, whether they are functions of an output itself, and not of its differences.
-    pub(super) fn moves(self) -> Option<bool> {
+    /// The motion of an output of which friction or play is a function.
+    pub(super) fn motion(self, output: usize) -> Option<Motion> {
         match self {
-            Shape::Friction(_) | Shape::Backlash => Some(false),
-            Shape::FrictionAtSpeed(_) => Some(true),
+            Shape::Friction(_) | Shape::Backlash => Some(Motion { output, at_speed: false }),
+            Shape::FrictionAtSpeed(_) => Some(Motion { output, at_speed: true }),
             Shape::Smooth(..) | Shape::Beyond(_) => None,
         }
     }
@@ -98,7 +98,7 @@ impl Shape {
 pub(super) struct Motion {
     pub(super) output: usize,
     /// Whether it is that output itself, not its differences.
-    pub(super) at_speed: bool,
+    at_speed: bool,
 }
 
 impl Motion {

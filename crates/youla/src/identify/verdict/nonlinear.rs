@@ -315,8 +315,7 @@ impl<'a> Beside<'a> {
         let rest = Bands::new(&pairs, (channel.place(), channels), |f, fx, x| {
             c * c * (f - fx.norm_sqr() / x.max(TINY)).max(0.0)
         });
-        let linear = self.shapes[f / m].moves().map(|at_speed| {
-            let motion = Motion { output: seen, at_speed };
+        let linear = self.shapes[f / m].motion(seen).map(|motion| {
             let pairs = self.spectra.records.iter().zip(&self.clean);
             let lines: Vec<Vec<c64>> = pairs.map(|of| lines_of_motion(of, (self.model, p), motion)).collect();
             let pairs: Vec<(&[c64], &[c64])> = plain().zip(lines.iter().map(Vec::as_slice)).collect();

@@ -26,7 +26,7 @@ const STEP: f64 = 1e-3;
 /// The criterion of N samples takes `2 N log |z|` for a pole outside of the unit circle (the noise passes it mirrored), which the normal
 /// distribution of the parameters lacks: at `1 + OUTSIDE / N` the likelihood is that without it times exp(-3).
 const OUTSIDE: f64 = 3.0;
-/// Draws in place of one with such a pole, at most.
+/// Draws in place of one with such a pole, at most; then it is left out.
 const REDRAWN: usize = 100;
 /// A rival of less weight, for which a figure does not exist, does not make its interval unbounded.
 const NEGLIGIBLE: f64 = 0.01;
@@ -140,8 +140,9 @@ impl Region {
         ChannelScales::new(self.sizes.u.clone(), self.sizes.y.clone())
     }
 
-    /// The error in the loop that ran, with the friction and the play of its machine, at a frequency, Hz, up to that of Nyquist, by the errors of the parameters: also beyond `hz`, as below the lowest frequency
-    /// of a record, where a slow pole moves the response most. What the excitation shows beyond the parameters is that of the nearest band.
+    /// The error in the loop that ran, with the friction and the play of its machine, at a frequency, Hz, up to that of Nyquist, by the errors of the
+    /// parameters: also beyond `hz`, as below the lowest frequency of a record, where a slow pole moves the response most. What the excitation shows
+    /// beyond the parameters is that of the nearest band.
     pub fn at(&self, hz: f64) -> ResponseError {
         self.in_units(self.directions.at(self.share(hz)))
     }
@@ -223,7 +224,7 @@ impl Region {
         // the lowest frequency is that of one period in the records
         let radius = 1.0 + OUTSIDE * self.hz.first().map_or(0.0, |hz| hz * self.time.ts());
         let outside = |model: &Model| model.poles().iter().filter(|pole| pole.norm() > radius).count();
-        let allowed = outside(&self.directions.moved(&vec![0.0; self.directions.errors()]).0);
+        let allowed = outside(&self.directions.model);
         let draw = |place: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(place);
@@ -234,11 +235,13 @@ impl Region {
                 return Some(Draw { plant, distance: 0.0 });
             }
             let drawn = || (0..self.directions.errors()).map(|_| rng.sample(StandardNormal)).collect::<Vec<f64>>();
-            let errors = std::iter::repeat_with(drawn)
+            let (errors, (model, delays)) = std::iter::repeat_with(drawn)
                 .take(REDRAWN)
-                .find(|errors| outside(&self.directions.moved(errors).0) <= allowed)?;
+                .map(|errors| (self.directions.moved(&errors), errors))
+                .find_map(|(moved, errors)| (outside(&moved.0) <= allowed).then_some((errors, moved)))?;
             let distance = errors.iter().map(|e| e * e).sum::<f64>().sqrt();
-            Some(Draw { plant: self.plant_at(&errors).ok()?, distance })
+            let plant = physical::realised(&model, delays, &self.sizes, self.time).ok()?;
+            Some(Draw { plant, distance })
         };
         (0..count as u64).into_par_iter().filter_map(draw).collect()
     }

@@ -117,11 +117,17 @@ impl NonlinearPart {
         self.add_relative(LASTING * self.rest.ratio(share), errors, inputs, g);
     }
 
-    /// The same of what a linear function of the motion gives, which the model has as if it belonged to the plant without friction or play.
-    pub(crate) fn add_linear(&self, share: f64, errors: &mut [f64], inputs: usize, g: &[c64]) {
+    /// The same of what a linear function of the motion gives, which the model has as if it belonged to the plant without friction or play. Friction at
+    /// another mass reaches the output by other signs of the modes: where these cancel in g it does not fall with g, so that it counts by the
+    /// sum of their magnitudes, which comes with g.
+    pub(crate) fn add_linear(&self, share: f64, errors: &mut [f64], inputs: usize, (g, modes): (&[c64], &[f64])) {
         let Some(of) = &self.linear else { return };
         let per_channel = match self.channel {
-            Channel::Input(input) => FRICTION_ELSEWHERE * g[of.motion.output * inputs + input].norm_sqr(),
+            Channel::Input(input) => {
+                let entry = of.motion.output * inputs + input;
+                let shown = g[entry].norm_sqr();
+                (shown + FRICTION_ELSEWHERE * modes[entry].powi(2)).powi(2) / shown.max(TINY)
+            }
             Channel::Output(_) => 1.0,
         };
         let relative = of.bands.ratio(share) * per_channel * of.motion.gain(share).powi(2);

@@ -198,6 +198,19 @@ impl Model {
         Model { blocks, ..self.clone() }
     }
 
+    /// Magnitudes of the entries of G(z) where its parts have one phase, p x m row by row: that of D with the real poles, and that of each block with
+    /// a pair.
+    pub(crate) fn sum_of_modes(&self, z: c64) -> Vec<f64> {
+        let oscillates = |k: &usize| self.blocks[*k].poles().iter().any(|p| p.im != 0.0);
+        let pairs: Vec<usize> = (0..self.blocks.len()).filter(oscillates).collect();
+        let alone = |k: &usize| Model { blocks: vec![self.blocks[*k].clone()], d: vec![0.0; self.d.len()], ..*self };
+        let mut sum = vec![0.0; self.d.len()];
+        for part in std::iter::once(self.without(&pairs)).chain(pairs.iter().map(alone)) {
+            sum.iter_mut().zip(part.response(z)).for_each(|(sum, g)| *sum += g.norm());
+        }
+        sum
+    }
+
     /// G(z), p x m row by row.
     pub(crate) fn response(&self, z: c64) -> Vec<c64> {
         let (m, p) = (self.inputs, self.outputs);

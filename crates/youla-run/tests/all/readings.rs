@@ -8,8 +8,9 @@ use youla_run::{RunSettings, check_run};
 /// Sample time of the log.
 const TS: f64 = 0.01;
 
-/// `G = 0.02 / (z - 0.98)` under `kp = 2, ki = 5, kd = 0.05` behind a filter of 0.02 s, backward Euler, excited at the input.
-fn log(folder: &Folder) {
+/// `G = 0.02 / (z - 0.98)` under `kp = 2, ki = 5, kd = 0.05` behind a filter of 0.02 s, backward Euler, excited at the input, against a slow load of a given
+/// size.
+fn log(folder: &Folder, load: f64) {
     let mut text = "u,y,d\n".to_owned();
     let (mut x, mut i, mut lag, mut before) = (0.0, 0.0, 0.0, 0.0);
     for k in 0..1500u32 {
@@ -20,7 +21,7 @@ fn log(folder: &Folder) {
         lag = (0.02 * lag + 0.05 * (e - before)) / (0.02 + TS);
         before = e;
         let u = d + 2.0 * e + i + lag;
-        x = 0.98 * x + 0.02 * u;
+        x = 0.98 * x + 0.02 * (u - load * (0.002 * f64::from(k)).sin());
         writeln!(text, "{u},{y},{d}").unwrap();
     }
     std::fs::write(folder.path().join("log.csv"), text).unwrap();
@@ -40,7 +41,7 @@ fn finding(folder: &Folder, ts: f64, role: &str, controller: &str) -> Finding {
 #[test]
 fn the_reading_that_explains_the_log_is_named() {
     let folder = Folder::new("readings");
-    log(&folder);
+    log(&folder, 0.0);
     let pid = |form: &str, rule: &str, [ki, kd]: [&str; 2]| {
         format!(
             "{form}]\nfeedback = \"negative\"\ndiscretisation = \"{rule}\"\nkp = 2.0\n{ki} = 5.0\n{kd} = 0.05\nderivative_filter = 0.02\n"
@@ -64,5 +65,22 @@ fn the_reading_that_explains_the_log_is_named() {
     for (ts, role, controller, words) in cases {
         let found = finding(&folder, ts, role, &controller);
         assert!(found.severity != Severity::Note && found.advice.contains(words), "{words}: {found:?}");
+    }
+}
+
+/// A wrong delay leaves less than 1 % of an input that a slow load makes: the law is not the one that ran all the same.
+#[test]
+fn a_wrong_delay_is_named_beside_a_large_slow_load() {
+    let folder = Folder::new("readings-load");
+    log(&folder, 200.0);
+    let stated = "pid]\nfeedback = \"negative\"\ndiscretisation = \"backward-euler\"\nkp = 2.0\nki = 5.0\nkd = 0.05\n\
+                  derivative_filter = 0.02\n";
+    let right = finding(&folder, TS, "input_excitation", stated);
+    assert!(right.severity == Severity::Note && right.what.contains("agrees with the log"), "{right:?}");
+    for (delay, words) in [(1, "or `delay` one sample smaller"), (2, "or `delay` 2 samples smaller")] {
+        let found = finding(&folder, TS, "input_excitation", &format!("{stated}delay = {delay}\n"));
+        let left = found.numbers["residual"];
+        assert!(left < 0.01 && found.severity == Severity::Caution, "{found:?}");
+        assert!(found.advice.contains(words), "{found:?}");
     }
 }

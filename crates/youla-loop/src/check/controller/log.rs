@@ -47,13 +47,7 @@ impl<'a> Log<'a> {
         }
         let free = simulate_best(&with_trend(k)?, self.e.as_ref(), self.w.as_ref())?;
         all.push((Change::Trend, relative(&(&self.w - free), &self.w)));
-        for rows in [-1isize, 1] {
-            let (e, w) = shifted(&self.e, &self.w, rows);
-            all.push((Change::Shift(rows), self.residual(k, &e, &w)?));
-            let Some(d) = d else { continue };
-            let (d, u) = shifted(&d.to_owned(), &self.record.u.to_owned(), rows);
-            all.push((Change::InputShift(rows), self.residual(k, &e, &(&u - &d))?));
-        }
+        all.extend(self.shifts(k)?);
         if let Some(d) = d {
             all.push((Change::WithoutExcitation, self.residual(k, &self.e, &self.record.u.to_owned())?));
             all.push((Change::ExcitationSign, self.residual(k, &self.e, &(self.record.u + d))?));
@@ -79,6 +73,19 @@ impl<'a> Log<'a> {
             all.push((Change::Exchanged(i, j), self.residual(k, &e, &self.w)?));
         }
         all.extend(self.saturation(k)?);
+        Ok(all)
+    }
+
+    /// Channels a few samples earlier or later.
+    pub(super) fn shifts(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
+        let mut all = Vec::new();
+        for rows in [-1isize, 1, -2, 2] {
+            let (e, w) = shifted(&self.e, &self.w, rows);
+            all.push((Change::Shift(rows), self.residual(k, &e, &w)?));
+            let Some(d) = self.record.input_excitation.filter(|_| rows.abs() == 1) else { continue };
+            let (d, u) = shifted(&d.to_owned(), &self.record.u.to_owned(), rows);
+            all.push((Change::InputShift(rows), self.residual(k, &e, &(&u - &d))?));
+        }
         Ok(all)
     }
 

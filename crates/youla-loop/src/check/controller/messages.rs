@@ -41,7 +41,8 @@ impl Change {
             Change::Trend => "a linear trend of the outputs added: one of them drifts in the log".into(),
             Change::Shift(by) => {
                 let delay = if *by > 0 { "larger" } else { "smaller" };
-                format!("the outputs (and references) one sample {} against the input, or `delay` one sample {delay}", rows(*by))
+                let samples = if by.abs() == 1 { "one sample".into() } else { format!("{} samples", by.abs()) };
+                format!("the outputs (and references) {samples} {} against the input, or `delay` {samples} {delay}", rows(*by))
             }
             Change::InputShift(by) => {
                 format!("the input one sample {} against all other channels", rows(-*by))
@@ -106,7 +107,7 @@ impl ControllerCheck {
             let finding = Finding::new(Test::Excitation, Severity::Defect, record, what);
             return Some(finding.number("residual", self.residual).advice(advice));
         }
-        if self.residual <= options.controller_caution {
+        if self.residual <= options.controller_caution && self.change.is_none() {
             let what = if self.residual < NO_EXCITATION {
                 "the declared controller agrees with the log to rounding".to_owned()
             } else {

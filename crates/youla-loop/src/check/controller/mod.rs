@@ -146,6 +146,8 @@ const INTEGRATOR: f64 = 1.0 + 1e-6;
 const CLEARER: f64 = 0.8;
 /// What changes leave below which they explain alike: a log of five digits leaves this.
 const ROUNDING: f64 = 1e-5;
+/// What a law that ran as stated leaves of a log of four digits.
+const DIGITS: f64 = 1e-4;
 /// A change must leave less than this share of the residual.
 /// Chosen, not measured.
 const HELPS: f64 = 0.1;
@@ -189,29 +191,31 @@ pub fn controller<'a>(
     }
     let residual = log.residual(k, &log.e, &log.w)?;
     let mut change = None;
-    if residual > options.controller_caution {
-        for (candidate, left) in log.changes(k, of_gain)? {
-            // The simpler changes come first; a factor of -1 fits rounding better than a sign does.
-            if change.as_ref().is_none_or(|(_, best)| left + ROUNDING < CLEARER * (best + ROUNDING)) {
-                change = Some((candidate, left));
-            }
+    let cautious = residual > options.controller_caution;
+    // Beside travel a law with a wrong delay explains nearly all of the input, and the right one all of it.
+    let tried = match residual {
+        r if r > options.controller_caution => log.changes(k, of_gain)?,
+        r if r > DIGITS => log.shifts(k)?,
+        _ => Vec::new(),
+    };
+    for (candidate, left) in tried {
+        // The simpler changes come first; a factor of -1 fits rounding better than a sign does.
+        if change.as_ref().is_none_or(|(_, best)| left + ROUNDING < CLEARER * (best + ROUNDING)) {
+            change = Some((candidate, left));
         }
-        let least = HELPS * residual;
-        change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
-        let told = change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
-        change = if told { change } else { other(residual).or(change) };
+    }
+    change = change.filter(|(_, left)| *left < HELPS * residual && *left < 5.0 * options.controller_caution);
+    let tells =
+        |change: &Option<(Change, f64)>| change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
+    if cautious && !tells(&change) {
+        change = other(residual).or(change);
     }
     // A change that leaves more than a caution may only resemble what happened: a law that explains every part goes before it.
-    let told = change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
-    let varies = (excited || guided) && residual > options.controller_caution && !told;
+    let varies = (excited || guided) && cautious && !tells(&change);
     let parts = if varies { parts::parts(&log, k, options.controller_caution)? } else { None };
     let parts = parts.filter(|parts| change.is_none() || parts.explain_all());
     let change = change.filter(|_| parts.is_none());
-    let contained = if excited && change.is_none() && residual > options.controller_caution {
-        Some(log.contained(k)?)
-    } else {
-        None
-    };
+    let contained = if excited && change.is_none() && cautious { Some(log.contained(k)?) } else { None };
     Ok(ControllerCheck { residual, excited, guided, contained, change, parts })
 }
 
@@ -237,7 +241,7 @@ fn reading(readings: &[Reading], log: &Log<'_>, residual: f64, options: &CheckOp
 impl ControllerCheck {
     /// Whether the controller explains an input that something from outside moves: then no channel is shifted.
     pub(super) fn agrees(&self, options: &CheckOptions) -> bool {
-        self.residual <= options.controller_caution && (self.excited || self.guided)
+        self.residual <= options.controller_caution && self.change.is_none() && (self.excited || self.guided)
     }
 
     /// Samples at which another controller takes over or the declared one comes back.

@@ -188,6 +188,9 @@ pub struct Evidence {
     pub note: String,
 }
 
+/// Limits beyond which the size of a figure says nothing more.
+const FAR: f64 = 1e3;
+
 impl Evidence {
     /// A required test: a figure with the largest that is accepted.
     pub fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
@@ -232,8 +235,11 @@ impl Evidence {
         Evidence { note: note.into(), ..self }
     }
 
-    /// The figure as text: its distance from the limit where it rounds to the limit without being it.
+    /// The figure as text: its distance from the limit where it rounds to the limit without being it, and no size beyond [`FAR`] limits.
     pub fn value(&self) -> String {
+        if self.limit > 0.0 && self.figure > FAR * self.limit {
+            return format!("above {}", figure(FAR * self.limit));
+        }
         let (rounded, over) = (figure(self.figure), self.figure - self.limit);
         let alike = over != 0.0 && rounded.parse() == Ok(self.limit);
         let sign = if over < 0.0 { "-" } else { "+" };

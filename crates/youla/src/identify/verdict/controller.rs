@@ -85,7 +85,11 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
         let why = "the stated controller or its filter has no finite response at a frequency that is judged";
         return Ok(Some(Evidence::untested(QUESTION, LARGEST_CONTROLLER_ERROR, why)));
     };
-    let note = format!("the law leaves {:.2} % of the inputs{}", 100.0 * share, left_out(&residuals, &all));
+    let note = format!(
+        "over all frequencies the law leaves {:.2} % of the inputs{}",
+        100.0 * share,
+        left_out(&residuals, &all)
+    );
     let [figure, hz, significance] = worst;
     let evidence = Evidence::new(QUESTION, figure, LARGEST_CONTROLLER_ERROR).noted(note).at([hz, hz]);
     Ok(Some(evidence.beyond_chance(significance)))

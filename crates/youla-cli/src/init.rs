@@ -218,7 +218,8 @@ fn table(columns: &[SurveyedColumn]) -> String {
     for (from, SurveyedColumn { content, .. }) in names.iter().zip(columns) {
         match content {
             Ok(c) => {
-                let clock = c.step.map_or(String::new(), |step| format!("  even steps of {step:.6e}: a clock?"));
+                let clock =
+                    c.step.map_or(String::new(), |step| format!("  even steps of {step:.6e}: a clock or a ramp"));
                 text += &format!("{from:width$}  {:>9}  {:>12.5e}  {:>12.5e}{clock}\n", c.rows, c.low, c.high);
             }
             Err(problem) => text += &format!("{from:width$}  no channel: {problem}\n"),
@@ -241,7 +242,7 @@ fn next(args: &InitArgs, draft: &Draft) -> String {
         ),
     };
     let fill = match draft.feedback {
-        Some(_) => "Now fill in numerator and denominator of [controller], then\n",
+        Some(_) => "Now fill in the controller, in the form that you have it, then\n",
         None => "Now\n",
     };
     format!("wrote {file}\n{split}{fill}  youla check {file}\n  youla identify {file}")

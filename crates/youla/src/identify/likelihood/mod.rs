@@ -166,7 +166,7 @@ struct Doubts {
 
 impl Records<'_> {
     /// The model without the modes that only the noise may have shown, and the widening of its region: those that the excitation does not show,
-    /// where the model rests on the noise that the feedback brings to the inputs, or those at whose frequencies it fails a test.
+    /// where the model rests on the noise that the feedback brings to the inputs or where it fails a test among them, or those at whose frequencies it fails a test.
     fn without_unseen(
         &self,
         found: &Cleaned,
@@ -175,11 +175,15 @@ impl Records<'_> {
         candidates: &mut Vec<Candidate>,
     ) -> Option<(WithoutUnseen, f64)> {
         let witness = witness.as_ref().filter(|_| !judged.trusted())?;
-        let shown = |turns: f64| *informed || witness.shows(turns);
+        let failed: Vec<[f64; 2]> = judged.evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
+        let in_doubt = |turns: f64| {
+            let mut at = failed.iter().filter(|[low, high]| low == high).map(|[hz, _]| hz * self.time.ts());
+            at.any(|at| witness.shows_none_between(turns, at))
+        };
+        let shown = |turns: f64| if *informed { !in_doubt(turns) } else { witness.shows(turns) };
         if let Some(without) = without_unseen(self.all, found, &shown, candidates) {
             return Some((without.beside(&found.solution.chosen), 1.0));
         }
-        let failed: Vec<[f64; 2]> = judged.evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
         let near = |hz: f64| failed.iter().any(|[low, high]| (low / BAND_RATIO..high * BAND_RATIO).contains(&hz));
         let passed = |turns: f64| !near(turns / self.time.ts());
         without_unseen(self.all, found, &passed, candidates).map(|without| (without, CANCELLED_MODE))

@@ -117,6 +117,13 @@ impl Witness {
             .is_some_and(|near| near.iter().any(Option::is_some))
     }
 
+    /// Whether the excitation shows the response nowhere between two frequencies, shares of the sample rate.
+    pub(crate) fn shows_none_between(&self, one: f64, other: f64) -> bool {
+        let place = |share: f64| self.whole.partition.of(2.0 * share);
+        let (first, last) = (place(one.min(other) / BAND_RATIO), place(one.max(other) * BAND_RATIO));
+        self.whole.bands.get(first..=last).is_some_and(|bands| bands.iter().all(Option::is_none))
+    }
+
     /// The lines of the estimation records with the part of the inputs that the excitation explains; `None` where it does not reach all.
     pub(crate) fn excited(&self, spectra: &Spectra) -> Option<Spectra> {
         if !self.whole.shows_all() || self.excited.len() != spectra.records.len() {

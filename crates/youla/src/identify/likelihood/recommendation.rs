@@ -235,7 +235,7 @@ impl Evidence {
         Evidence { note: note.into(), ..self }
     }
 
-    /// The figure as text: its distance from the limit where it rounds to the limit without being it, and no size beyond [`FAR`] limits.
+    /// The figure as text: its distance from the limit where it rounds to the limit without being it, and no size beyond a thousand limits.
     pub fn value(&self) -> String {
         if self.limit > 0.0 && self.figure > FAR * self.limit {
             return format!("above {}", figure(FAR * self.limit));

@@ -193,10 +193,12 @@ pub fn controller<'a>(
     let mut change = None;
     let cautious = residual > options.controller_caution;
     // Beside travel a law with a wrong delay explains nearly all of the input, and the right one all of it.
-    let tried = match residual {
-        r if r > options.controller_caution => log.changes(k, of_gain)?,
-        r if r > DIGITS => log.shifts(k)?,
-        _ => Vec::new(),
+    let tried = if cautious {
+        log.changes(k, of_gain)?
+    } else if residual > DIGITS {
+        log.shifts(k)?
+    } else {
+        Vec::new()
     };
     for (candidate, left) in tried {
         // The simpler changes come first; a factor of -1 fits rounding better than a sign does.

@@ -166,7 +166,8 @@ struct Doubts {
 
 impl Records<'_> {
     /// The model without the modes that only the noise may have shown, and the widening of its region: those that the excitation does not show,
-    /// where the model rests on the noise that the feedback brings to the inputs or where it fails a test among them, or those at whose frequencies it fails a test.
+    /// where the model rests on the noise that the feedback brings to the inputs those in the gap of the
+    /// excitation in which it fails a test, or those at whose frequencies it fails one.
     fn without_unseen(
         &self,
         found: &Cleaned,
@@ -176,11 +177,9 @@ impl Records<'_> {
     ) -> Option<(WithoutUnseen, f64)> {
         let witness = witness.as_ref().filter(|_| !judged.trusted())?;
         let failed: Vec<[f64; 2]> = judged.evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
-        let in_doubt = |turns: f64| {
-            let mut at = failed.iter().filter(|[low, high]| low == high).map(|[hz, _]| hz * self.time.ts());
-            at.any(|at| witness.shows_none_between(turns, at))
-        };
-        let shown = |turns: f64| if *informed { !in_doubt(turns) } else { witness.shows(turns) };
+        let at = failed.iter().filter(|[low, high]| low == high).map(|[hz, _]| hz * self.time.ts());
+        let apart = |turns: f64| at.clone().all(|at| witness.shows_between(turns, at));
+        let shown = |turns: f64| if *informed { apart(turns) } else { witness.shows(turns) };
         if let Some(without) = without_unseen(self.all, found, &shown, candidates) {
             return Some((without.beside(&found.solution.chosen), 1.0));
         }

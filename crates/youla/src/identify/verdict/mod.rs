@@ -202,9 +202,8 @@ fn of_region(
     let test = match &loop_ratio {
         Some(r) => {
             let question = "Part of the margin of the loop that the 95 % region takes, largest over frequency (region)";
-            let entries = (0..p).flat_map(|i| (0..m).map(move |j| (i, j)));
-            let unseen = entries.into_iter().any(|(i, j)| !shown(r.largest_hz * ts, i, j));
-            let unseen = if unseen { ", where the excitation does not show the plant" } else { "" };
+            let seen = (0..p).all(|i| (0..m).all(|j| shown(r.largest_hz * ts, i, j)));
+            let unseen = if seen { "" } else { ", where the excitation does not show the plant" };
             let dominant = format!("mostly {} there{unseen}", dominant(region, r.largest_hz));
             Evidence::new(question, r.largest, LARGEST_RATIO_OF_LOOP).at([r.largest_hz; 2]).noted(dominant)
         }

@@ -72,6 +72,16 @@ impl Planted {
     }
 }
 
+/// Frequencies in a range, Hz, each with the error of the response of the first entry and its stated deviation.
+fn errors(found: &Identified, truth: &StateSpace<Discrete>, range: std::ops::Range<f64>) -> Vec<[f64; 3]> {
+    let region = &found.model.region;
+    let hz: Vec<usize> = (0..region.hz.len()).filter(|k| range.contains(&region.hz[*k])).collect();
+    let omega: Vec<f64> = hz.iter().map(|k| std::f64::consts::TAU * region.hz[*k]).collect();
+    let [g, model] = [truth, &found.model.plant].map(|g| frequency_response(g, &omega).unwrap());
+    let error = |i: usize| (g.at(i)[(0, 0)] - model.at(i)[(0, 0)]).norm();
+    hz.iter().enumerate().map(|(i, k)| [region.hz[*k], error(i), region.absolute[*k][(0, 0)]]).collect()
+}
+
 fn outcome<'a>(found: &'a Identified, name: &str) -> &'a Evidence {
     found.model.evidence.iter().find(|e| e.question.contains(name)).unwrap()
 }

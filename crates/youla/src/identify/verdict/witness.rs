@@ -110,18 +110,14 @@ impl Witness {
 impl Witness {
     /// Whether the excitation shows the response near a frequency, a share of the sample rate.
     pub(crate) fn shows(&self, turns: f64) -> bool {
-        let bands = &self.whole.bands;
-        let place = |share: f64| self.whole.partition.of(2.0 * share);
-        bands
-            .get(place(turns / BAND_RATIO)..=place(turns * BAND_RATIO))
-            .is_some_and(|near| near.iter().any(Option::is_some))
+        self.shows_between(turns, turns)
     }
 
-    /// Whether the excitation shows the response nowhere between two frequencies, shares of the sample rate.
-    pub(crate) fn shows_none_between(&self, one: f64, other: f64) -> bool {
+    /// Whether the excitation shows the response near or between two frequencies, shares of the sample rate.
+    pub(crate) fn shows_between(&self, one: f64, other: f64) -> bool {
         let place = |share: f64| self.whole.partition.of(2.0 * share);
         let (first, last) = (place(one.min(other) / BAND_RATIO), place(one.max(other) * BAND_RATIO));
-        self.whole.bands.get(first..=last).is_some_and(|bands| bands.iter().all(Option::is_none))
+        self.whole.bands.get(first..=last).is_some_and(|near| near.iter().any(Option::is_some))
     }
 
     /// The lines of the estimation records with the part of the inputs that the excitation explains; `None` where it does not reach all.

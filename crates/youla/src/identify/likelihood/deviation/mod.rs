@@ -220,22 +220,22 @@ impl Directions {
     /// The same, also against the plant without them.
     pub(crate) fn against_linear(&self, share: f64) -> ResponseError {
         let mut error = self.at(share);
-        self.add_linear(share, &mut error.alone);
+        self.add_linear(share, &mut error.alone, &delayed(&self.model, &self.delays, share));
         error
     }
 
-    fn add_linear(&self, share: f64, errors: &mut [f64]) {
+    /// Adds what friction and play do linearly to the mean squares of the errors of the response g.
+    fn add_linear(&self, share: f64, errors: &mut [f64], g: &[c64]) {
         if !self.nonlinear.is_empty() {
             let modes = self.model.sum_of_modes(c64::cis(std::f64::consts::TAU * share));
-            let g = (&delayed(&self.model, &self.delays, share)[..], &modes[..]);
-            self.nonlinear.iter().for_each(|part| part.add_linear(share, errors, self.model.inputs, g));
+            self.nonlinear.iter().for_each(|part| part.add_linear(share, errors, self.model.inputs, (g, &modes)));
         }
     }
 
     /// Mean squares of the error of each entry by their causes, also against the plant without the friction and the play of the records.
     pub(crate) fn parts(&self, share: f64) -> Parts {
         let Columns { g, parameters, squares, rivals, variation, mut distortion } = self.columns(share);
-        self.add_linear(share, &mut distortion);
+        self.add_linear(share, &mut distortion, &g);
         let squares = self.finite(share, &g, &parameters, &squares);
         let noise: Vec<f64> = squares.iter().map(|square| square / self.scatter).collect();
         let choice = |i: usize| (0..rivals.ncols()).map(|k| rivals[(i, k)].norm_sqr()).sum::<f64>();

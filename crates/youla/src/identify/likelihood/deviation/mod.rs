@@ -205,9 +205,15 @@ impl Directions {
         })
     }
 
-    /// The error of the response, scaled channels, under the friction and the play of the records: the loop ran with both.
-    pub(crate) fn at(&self, share: f64) -> ResponseError {
-        let Columns { parameters, rivals, variation, distortion, .. } = self.columns(share);
+    /// The error of the response, scaled channels, under the friction and the play of the records: the loop ran with both. Below one period of the
+    /// records, a share of the sample rate, models of other structure differ as they do at that period: what is slower no record tells from none.
+    pub(crate) fn at(&self, share: f64, period: f64) -> ResponseError {
+        let Columns { g, parameters, mut rivals, variation, distortion, .. } = self.columns(share);
+        if share < period {
+            let of_period = self.columns(period);
+            let factor = |i: usize| if of_period.g[i] == c64::ZERO { c64::ONE } else { g[i] / of_period.g[i] };
+            rivals = Mat::from_fn(rivals.nrows(), rivals.ncols(), |i, k| of_period.rivals[(i, k)] * factor(i));
+        }
         // What the excitation shows of an error is its size, not its phase.
         let alone = variation.iter().zip(&distortion).map(|(a, b)| a + b).collect();
         let (first, entries) = (parameters.shared.ncols(), rivals.nrows());
@@ -219,7 +225,7 @@ impl Directions {
 
     /// The same, also against the plant without them.
     pub(crate) fn against_linear(&self, share: f64) -> ResponseError {
-        let mut error = self.at(share);
+        let mut error = self.at(share, share);
         self.add_linear(share, &mut error.alone, &delayed(&self.model, &self.delays, share));
         error
     }

@@ -141,10 +141,12 @@ impl Region {
     }
 
     /// The error in the loop that ran, with the friction and the play of its machine, at a frequency, Hz, up to that of Nyquist, by the errors of the
-    /// parameters: also beyond `hz`, as below the lowest frequency of a record, where a slow pole moves the response most. What the excitation shows
-    /// beyond the parameters is that of the nearest band.
+    /// parameters: also beyond `hz`, as below one period of the records, where a slow pole moves the response most. What the excitation shows
+    /// beyond the parameters is that of the nearest band, and models of another structure differ below that period, relative to the response, as they
+    /// do there: a lag that is slower no record tells from none.
     pub fn at(&self, hz: f64) -> ResponseError {
-        self.in_units(self.directions.at(self.share(hz)))
+        let period = self.hz.first().map_or(0.0, |hz| self.share(*hz));
+        self.in_units(self.directions.at(self.share(hz), period))
     }
 
     /// The errors of the entries at frequencies, Hz, those of `absolute`: against the plant without friction and play, whose linear parts the model
@@ -270,15 +272,38 @@ mod tests {
     use super::*;
     use crate::identify::likelihood::search::chart::Chart;
 
-    /// Draws of a region of one pole that is known to 0.2, from 1000 samples.
-    fn drawn(pole: f64) -> Vec<Draw> {
+    /// The region of one pole that is known to a deviation, from 1000 samples, beside a rival as likely with a small lag of 1e5 samples.
+    fn region(pole: f64, deviation: f64, lag: f64) -> Region {
         let one = Mat::<f64>::identity(1, 1);
         let model = Model::of((&one * pole).as_ref(), one.as_ref(), one.as_ref(), vec![0.0]).unwrap();
         let mut chart = Chart::fixed(&model);
         chart.directions[0] = Mat::from_fn(3, 1, |i, _| if i == 0 { 1.0 } else { 0.0 });
-        let directions = Directions::of_parts((model, vec![0]), chart, Root::dense(&one * 0.2), Vec::new());
+        let a = Mat::from_fn(2, 2, |i, j| if i == j { [pole, 1.0 - 1e-5][i] } else { 0.0 });
+        let (b, c) = (Mat::from_fn(2, 1, |_, _| 1.0), Mat::from_fn(1, 2, |_, j| [1.0, lag * 1e-5][j]));
+        let rival = Model::of(a.as_ref(), b.as_ref(), c.as_ref(), vec![0.0]).unwrap();
+        let rivals = [model.clone(), rival].map(|model| (model, vec![0], 0.0)).into();
+        let directions = Directions::of_parts((model, vec![0]), chart, Root::dense(&one * deviation), rivals);
         let sizes = Sizes { u: vec![1.0], y: vec![1.0] };
-        Region::new(sizes, Discrete::new(1.0).unwrap(), &[1e-3, 0.1, 0.4], directions).draws(500, 1)
+        Region::new(sizes, Discrete::new(1.0).unwrap(), &[1e-3, 0.1, 0.4], directions)
+    }
+
+    /// Below one period of the records the parameters count as there, and a lag of which the records show nothing as at that period.
+    #[test]
+    fn the_error_at_zero_is_that_of_the_parameters_and_no_slower_lag() {
+        let at_zero = |deviation, lag| region(0.9, deviation, lag).at(0.0).entries().of_magnitude(c64::new(10.0, 0.0), (0, 0));
+        // d (1 / (1 - a)) = da / (1 - a)^2, with half of the weight on the rival, whose first mode is the same
+        assert!((at_zero(1e-3, 0.0) - 0.1).abs() < 1e-9, "{}", at_zero(1e-3, 0.0));
+        // a lag of half of the gain at zero frequency is 1e-5 / 2 pi 1e-3 of it at the period of the records
+        assert!(at_zero(1e-9, 5.0) < 0.01, "{}", at_zero(1e-9, 5.0));
+        assert!(at_zero(1e-9, 5.0) > 0.0);
+    }
+
+    fn drawn(pole: f64) -> Vec<Draw> {
+        let alone = |mut region: Region| {
+            region.directions.rivals.clear();
+            region
+        };
+        alone(region(pole, 0.2, 0.0)).draws(500, 1)
     }
 
     /// A third of the normal distribution lies outside of the circle, where the records of a stable plant cannot lie.

@@ -59,7 +59,7 @@ use crate::{Error, MatRef, Result};
 use choose::deadline::Deadline;
 use choose::lines::{self, Cleaned};
 use choose::problem::Problem;
-use choose::unseen::{WithoutUnseen, without_unseen};
+use choose::unseen::{WithoutUnseen, is_damped, without_unseen};
 use data::spectra::Sizes;
 use deviation::Directions;
 use deviation::interpolation::Interpolated;
@@ -165,9 +165,9 @@ struct Doubts {
 }
 
 impl Records<'_> {
-    /// The model without the modes that only the noise may have shown, and the widening of its region: those that the excitation does not show,
-    /// where the model rests on the noise that the feedback brings to the inputs those in the gap of the
-    /// excitation in which it fails a test, or those at whose frequencies it fails one.
+    /// The model without the modes that only the noise may have shown, and the widening of its region: disturbances at one frequency; those that the
+    /// excitation does not show, or where the model does not rest on the noise that the feedback brings to the inputs those in the gap of the
+    /// excitation in which it fails a test; or those at whose frequencies it fails one.
     fn without_unseen(
         &self,
         found: &Cleaned,
@@ -180,6 +180,10 @@ impl Records<'_> {
         let at = failed.iter().filter(|[low, high]| low == high).map(|[hz, _]| hz * self.time.ts());
         let apart = |turns: f64| at.clone().all(|at| witness.shows_between(turns, at));
         let shown = |turns: f64| if *informed { apart(turns) } else { witness.shows(turns) };
+        let damped = |turns: f64| is_damped(self.all, &found.solution.chosen, turns);
+        if let Some(without) = without_unseen(self.all, found, &damped, candidates) {
+            return Some((without, 1.0));
+        }
         if let Some(without) = without_unseen(self.all, found, &shown, candidates) {
             return Some((without.beside(&found.solution.chosen), 1.0));
         }

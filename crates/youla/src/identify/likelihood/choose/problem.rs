@@ -216,16 +216,21 @@ impl Problem<'_> {
     ///
     /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`.
     pub(super) fn unstable_poles(&self, choice: &Choice) -> Vec<(c64, f64)> {
+        let least = GROWTH / self.samples().0 as f64;
+        let outside = self.poles_outside(choice).into_iter();
+        outside.filter(|(z, apart)| z.norm().ln() > least || *apart > least).collect()
+    }
+
+    /// The same with those on the circle that the feedback does not move.
+    pub(super) fn poles_outside(&self, choice: &Choice) -> Vec<(c64, f64)> {
         let poles = |k: &StateSpace<Discrete>| {
             let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
             let of_loop = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
             Some((plant.poles().ok()?, of_loop))
         };
         let Some((own, of_loop)) = self.feedback.and_then(poles) else { return Vec::new() };
-        let least = GROWTH / self.samples().0 as f64;
         let apart = |z: &c64| own.iter().map(|p| (p - z).norm()).fold(f64::INFINITY, f64::min);
-        let outside = of_loop.into_iter().filter(|z| z.norm() >= 1.0).map(|z| (z, apart(&z)));
-        outside.filter(|(z, apart)| z.norm().ln() > least || *apart > least).collect()
+        of_loop.into_iter().filter(|z| z.norm() >= 1.0).map(|z| (z, apart(&z))).collect()
     }
 
     /// What a search found on so many samples.

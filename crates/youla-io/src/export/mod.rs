@@ -18,6 +18,7 @@ mod precision;
 mod predictor;
 mod python;
 mod read;
+mod second_order;
 mod sequence;
 mod text;
 

@@ -10,6 +10,7 @@ use super::pid_tables::{Firmware, table};
 use super::text::{PROGRAM, number, plain};
 use crate::error::Result;
 use std::fmt::Write;
+use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 
 /// A PID with notches, and what is known of its channels.
@@ -43,6 +44,8 @@ pub struct PidExport {
     pub delay: usize,
     /// Time constant of a filter of the reference that keeps the overshoot of a step to 10 %, seconds; zero for none.
     pub reference_filter: f64,
+    /// The model, where it has one input and one output: on it a filter of another order is judged.
+    pub plant: Option<StateSpace<Discrete>>,
     /// Weights of the reference in the proportional and in the derivative part with which this overshoot holds.
     pub reference_weights: [f64; 2],
     /// Where it comes from.

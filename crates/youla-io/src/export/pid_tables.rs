@@ -8,6 +8,7 @@
 //! | ODrive 0.5 and later, velocity controller | `vel_gain e + vel_integrator_gain int(e)` | e in turn/s; Nm |
 
 use super::pid::PidExport;
+use super::second_order::{SecondOrder, second_order};
 use super::text::number;
 use crate::error::{Error, Result};
 use std::fmt::Write;
@@ -28,6 +29,9 @@ pub enum Firmware {
 
 /// Scale of P, I and D in Betaflight, and its largest gain (`pid.h`).
 const BETAFLIGHT: ([f64; 3], f64) = ([0.032029, 0.244381, 0.000529], 250.0);
+
+/// Largest peak sensitivity with PX4's filter, in that of the design.
+const MOST_PEAK: f64 = 1.1;
 
 impl Firmware {
     /// The word of `youla export --to`.
@@ -57,13 +61,8 @@ impl Firmware {
             Firmware::Betaflight => {
                 vec!["set dterm_lpf1_type = PT1".into(), format!("set dterm_lpf1_static_hz = {rounded}")]
             }
-            Firmware::Px4 => vec![
-                "# IMU_DGYRO_CUTOFF is a filter of second order: twice the cutoff has about the delay of the design"
-                    .into(),
-                format!("param set IMU_DGYRO_CUTOFF {}", 2.0 * rounded),
-            ],
             Firmware::ArduPilot => vec![format!("ATC_RAT_RLL_FLTD,{}", number(hz))],
-            Firmware::Odrive => Vec::new(),
+            Firmware::Px4 | Firmware::Odrive => Vec::new(),
         }
     }
 
@@ -177,7 +176,9 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     let gains = [pid.kp, pid.ki, pid.kd];
     let mut lines = firmware.beyond(gains);
     lines.extend(firmware.gains(gains));
-    if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
+    if pid.kd != 0.0 && pid.derivative_filter > 0.0 && firmware == Firmware::Px4 {
+        lines.extend(cutoff_of_px4(pid)?);
+    } else if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
         lines.extend(firmware.filter(0.5 / (std::f64::consts::PI * pid.derivative_filter)));
     }
     for ([hz, width, depth], _) in &pid.notches {
@@ -188,9 +189,41 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     Ok(text)
 }
 
+/// The cutoff of PX4's filter of second order, which takes the place of that of the design.
+fn cutoff_of_px4(pid: &PidExport) -> Result<Vec<String>> {
+    let path = || PathBuf::from("pid.json");
+    let Some(plant) = &pid.plant else {
+        let problem = "the derivative filter of PX4 is of second order, and this run has no model with one input and one output on which it could be \
+                       judged; set terms = \"pi\" in [redesign.pid]";
+        return Err(Error::NotAModel { path: path(), problem: problem.into() });
+    };
+    let first = format!("{:.2}", 0.5 / (std::f64::consts::PI * pid.derivative_filter));
+    let found = second_order(pid, plant)?;
+    match found {
+        Some(SecondOrder { hz, peak, designed }) if peak <= MOST_PEAK * designed => Ok(vec![
+            format!(
+                "# IMU_DGYRO_CUTOFF is a filter of second order for all axes: with it the peak sensitivity on the model is {peak:.2}, {designed:.2} with \
+                 the filter of the design, first order at {first} Hz"
+            ),
+            format!("param set IMU_DGYRO_CUTOFF {hz:.1}"),
+        ]),
+        found => {
+            let most = found.map_or("leaves the model unstable".to_owned(), |f| {
+                format!("raises the peak sensitivity on the model from {:.2} to {:.2}", f.designed, f.peak)
+            });
+            let problem = format!(
+                "the derivative is filtered by first order at {first} Hz, that of PX4 by second order, whose best cutoff {most}; set terms = \"pi\" or a \
+                 larger command_effort in [redesign.pid], which moves the filter up"
+            );
+            Err(Error::NotAModel { path: path(), problem })
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use youla::lti::{Discrete, StateSpace};
     use youla::signal::Channel;
 
     fn pid() -> PidExport {
@@ -210,6 +243,7 @@ mod tests {
             delay: 0,
             reference_filter: 0.0,
             reference_weights: [1.0; 2],
+            plant: None,
             origin: "a run".into(),
         }
     }
@@ -229,7 +263,38 @@ mod tests {
         let si = PidExport { measured: Channel::new("gyro", "rad/s"), ..pid() };
         let text = table(&si, &[], Firmware::ArduPilot).unwrap();
         assert!(text.contains("ATC_RAT_RLL_D,0.015\n") && text.contains("ATC_RAT_RLL_FLTD,80."), "{text}");
-        assert!(table(&si, &[], Firmware::Px4).unwrap().contains("param set IMU_DGYRO_CUTOFF 160\n"));
+    }
+
+    /// A rate of 1 / s behind a dead time of 2 samples at 2 kHz: the fast filter of the design has a near enough one of second order, a run without the model has
+    /// none.
+    #[test]
+    fn the_filter_of_px4_is_judged_on_the_model() {
+        let of = |ts: f64, filter_hz: f64| {
+            let time = Discrete::new(ts).unwrap();
+            let line = |c: &[f64]| vec![vec![c.to_vec()]];
+            let plant =
+                StateSpace::difference_equation(&line(&[0.0, 0.0, 0.0, ts]), &line(&[1.0, -1.0]), time).unwrap();
+            let lag = 1.0 / (std::f64::consts::TAU * filter_hz);
+            let derivative = [0.1 / (lag + ts), lag / (lag + ts)];
+            PidExport {
+                measured: Channel::new("gyro", "rad/s"),
+                ts,
+                kp: 25.0,
+                ki: 0.0,
+                kd: 0.1,
+                derivative_filter: lag,
+                integral: [0.0; 2],
+                derivative,
+                notches: Vec::new(),
+                plant: Some(plant),
+                ..pid()
+            }
+        };
+        let text = table(&of(5e-4, 200.0), &[], Firmware::Px4).unwrap();
+        let cutoff = text.lines().find_map(|line| line.strip_prefix("param set IMU_DGYRO_CUTOFF ")).unwrap();
+        assert!(cutoff.parse::<f64>().unwrap() >= 200.0, "{text}");
+        let without = table(&PidExport { plant: None, ..of(5e-4, 200.0) }, &[], Firmware::Px4).unwrap_err().to_string();
+        assert!(without.contains("no model"), "{without}");
     }
 
     #[test]

@@ -134,8 +134,15 @@ pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
             .reference_weights
             .and_then(|of| of.get(place).map(|w| [w.proportional, w.derivative]))
             .unwrap_or([1.0; 2]),
+        plant: (loops == 1).then(|| recommended_of(run)).flatten(),
         origin: origin(run, &path)?,
     })
+}
+
+/// The recommended plant of a run, where it has one input and one output.
+fn recommended_of(run: &Path) -> Option<StateSpace<Discrete>> {
+    let plant = read_model(run.join("4-identify/recommended.json")).ok()?.system;
+    (plant.inputs() == 1 && plant.outputs() == 1).then_some(plant)
 }
 
 /// The new PID of a run as `8-redesign/pid.json` states it.

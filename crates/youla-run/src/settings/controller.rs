@@ -4,7 +4,7 @@ use super::cascade::Cascade;
 use super::explain::forms;
 use super::feedback::Feedback;
 use super::models::{Domain, Polynomials, matrix, model_file, sized};
-use super::pid::{IdealPid, ParallelPid};
+use super::pid::{Discretisation, IdealPid, ParallelPid};
 use super::refuse;
 use crate::Result;
 use faer::Scale;
@@ -170,6 +170,15 @@ impl ControllerSettings {
             Self::IdealPid(pid) => pid.delay,
             Self::Cascade(cascade) => cascade.delay,
             Self::ModelFile { .. } | Self::Observer { .. } => 0,
+        }
+    }
+
+    /// The rule of a PID; that of one without a derivative does not follow from its response.
+    pub(crate) fn discretisation(&self) -> Option<Discretisation> {
+        match self {
+            Self::Pid(pid) => Some(pid.discretisation),
+            Self::IdealPid(pid) => Some(pid.discretisation),
+            _ => None,
         }
     }
 

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::{Recommendation, Region};
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::redesign::structured::{PidProblem, PidRedesign, design_pid};
+use youla_loop::redesign::structured::{PidOptions, PidProblem, PidRedesign, design_pid};
 use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign};
 
 /// Designs on the reduced model where there is one, else on the recommended plant; every new controller is tested on the plant and its
@@ -49,7 +49,8 @@ pub(crate) fn pid_of(
     let (running, delay) = (run.declared.controller(), run.settings.controller.delay());
     let reference = run.settings.controller.reference_path(running.time())?;
     let problem = PidProblem { points, running, delay, reference, trusted };
-    let found = design_pid(&problem, &options.pid, &options.band);
+    let discretisation = options.pid.discretisation.or(run.settings.controller.discretisation());
+    let found = design_pid(&problem, &PidOptions { discretisation, ..options.pid.clone() }, &options.band);
     found.map_err(|e| Error::from(e).within("[redesign]"))
 }
 

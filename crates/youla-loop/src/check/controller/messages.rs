@@ -45,7 +45,9 @@ impl Change {
                 format!("the outputs (and references) {samples} {} against the input, or `delay` {samples} {delay}", rows(*by))
             }
             Change::InputShift(by) => {
-                format!("the input one sample {} against all other channels", rows(-*by))
+                let delay = if *by > 0 { "larger" } else { "smaller" };
+                let only = "where no excitation enters at the input";
+                format!("the input one sample {} against all other channels, or, {only}, `delay` one sample {delay}", rows(-*by))
             }
             Change::Gain(gain) => format!("{} times the gain{}", few(*gain), unit(*gain)),
             Change::ChannelGain(i, gain) => format!("{} times {}{}", few(*gain), name(*i), unit(*gain)),

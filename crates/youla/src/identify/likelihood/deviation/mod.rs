@@ -22,8 +22,8 @@ mod stored;
 use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::choose::problem::{Choice, Problem, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::DAMPED;
+use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::separable::separable;
@@ -190,7 +190,8 @@ impl Directions {
     pub(crate) fn with_spreads(mut self, problem: &Problem<'_>, solution: &Solution) -> Self {
         let of = |(model, delays, weight): &(Model, Vec<usize>, f64)| {
             let is_drawn = weight * weight > LEAST_DRAWN && self.is_other(model, delays) && !separable(model.outputs);
-            let drawn = || solution.weighed().map(|(c, _)| c).find(|c| c.delays == *delays && c.found.point.model == *model);
+            let drawn =
+                || solution.weighed().map(|(c, _)| c).find(|c| c.delays == *delays && c.found.point.model == *model);
             let choice = is_drawn.then(drawn).flatten()?;
             let (spectra, found) = (problem.spectra(delays), &choice.found);
             let spectra = grouped(&spectra, &found.point, DAMPED).unwrap_or(spectra);

@@ -287,7 +287,8 @@ mod tests {
     /// Below one period of the records the parameters count as there, and a lag of which the records show nothing as at that period.
     #[test]
     fn the_error_at_zero_is_that_of_the_parameters_and_no_slower_lag() {
-        let at_zero = |deviation, lag| region(0.9, deviation, lag).at(0.0).entries().of_magnitude(c64::new(10.0, 0.0), (0, 0));
+        let at_zero =
+            |deviation, lag| region(0.9, deviation, lag).at(0.0).entries().of_magnitude(c64::new(10.0, 0.0), (0, 0));
         // d (1 / (1 - a)) = da / (1 - a)^2, with half of the weight on the rival, whose first mode is the same
         assert!((at_zero(1e-3, 0.0) - 0.1).abs() < 1e-9, "{}", at_zero(1e-3, 0.0));
         // a lag of half of the gain at zero frequency is 1e-5 / 2 pi 1e-3 of it at the period of the records

@@ -177,6 +177,7 @@ fn the_header_of_a_pid_computes_the_controller() {
             derivative: [kd * d[0] / lag[0], -lag[1] / lag[0]],
             notches: c.notches.iter().map(|n| ([n.hz, n.width, n.depth], n.coefficients(TS))).collect(),
             delay: 0,
+            plant: None,
             reference_filter: 0.0,
             reference_weights: [1.0; 2],
             origin: "a test".into(),

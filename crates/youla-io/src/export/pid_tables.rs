@@ -55,15 +55,15 @@ impl Firmware {
     }
 
     /// What its derivative is filtered by, for a first-order filter of `hz`.
-    fn filter(self, hz: f64) -> Vec<String> {
-        let rounded = hz.round();
-        match self {
+    fn filter(self, pid: &PidExport, hz: f64) -> Result<Vec<String>> {
+        Ok(match self {
             Firmware::Betaflight => {
-                vec!["set dterm_lpf1_type = PT1".into(), format!("set dterm_lpf1_static_hz = {rounded}")]
+                vec!["set dterm_lpf1_type = PT1".into(), format!("set dterm_lpf1_static_hz = {}", hz.round())]
             }
+            Firmware::Px4 => return cutoff_of_px4(pid, hz),
             Firmware::ArduPilot => vec![format!("ATC_RAT_RLL_FLTD,{}", number(hz))],
-            Firmware::Px4 | Firmware::Odrive => Vec::new(),
-        }
+            Firmware::Odrive => Vec::new(),
+        })
     }
 
     fn gains(self, [p, i, d]: [f64; 3]) -> Vec<String> {
@@ -176,10 +176,8 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     let gains = [pid.kp, pid.ki, pid.kd];
     let mut lines = firmware.beyond(gains);
     lines.extend(firmware.gains(gains));
-    if pid.kd != 0.0 && pid.derivative_filter > 0.0 && firmware == Firmware::Px4 {
-        lines.extend(cutoff_of_px4(pid)?);
-    } else if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
-        lines.extend(firmware.filter(0.5 / (std::f64::consts::PI * pid.derivative_filter)));
+    if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
+        lines.extend(firmware.filter(pid, 0.5 / (std::f64::consts::PI * pid.derivative_filter))?);
     }
     for ([hz, width, depth], _) in &pid.notches {
         let [hz, width, depth] = [hz, width, depth].map(|v| number(*v));
@@ -189,21 +187,19 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     Ok(text)
 }
 
-/// The cutoff of PX4's filter of second order, which takes the place of that of the design.
-fn cutoff_of_px4(pid: &PidExport) -> Result<Vec<String>> {
+/// The cutoff of PX4's filter of second order, which takes the place of that of the design, of first order at `first`, Hz.
+fn cutoff_of_px4(pid: &PidExport, first: f64) -> Result<Vec<String>> {
     let path = || PathBuf::from("pid.json");
     let Some(plant) = &pid.plant else {
         let problem = "the derivative filter of PX4 is of second order, and this run has no model with one input and one output on which it could be \
                        judged; set terms = \"pi\" in [redesign.pid]";
         return Err(Error::NotAModel { path: path(), problem: problem.into() });
     };
-    let first = format!("{:.2}", 0.5 / (std::f64::consts::PI * pid.derivative_filter));
-    let found = second_order(pid, plant)?;
-    match found {
+    match second_order(pid, plant, first)? {
         Some(SecondOrder { hz, peak, designed }) if peak <= MOST_PEAK * designed => Ok(vec![
             format!(
                 "# IMU_DGYRO_CUTOFF is a filter of second order for all axes: with it the peak sensitivity on the model is {peak:.2}, {designed:.2} with \
-                 the filter of the design, first order at {first} Hz"
+                 the filter of the design, first order at {first:.2} Hz"
             ),
             format!("param set IMU_DGYRO_CUTOFF {hz:.1}"),
         ]),
@@ -212,7 +208,7 @@ fn cutoff_of_px4(pid: &PidExport) -> Result<Vec<String>> {
                 format!("raises the peak sensitivity on the model from {:.2} to {:.2}", f.designed, f.peak)
             });
             let problem = format!(
-                "the derivative is filtered by first order at {first} Hz, that of PX4 by second order, whose best cutoff {most}; set terms = \"pi\" or a \
+                "the derivative is filtered by first order at {first:.2} Hz, that of PX4 by second order, whose best cutoff {most}; set terms = \"pi\" or a \
                  larger command_effort in [redesign.pid], which moves the filter up"
             );
             Err(Error::NotAModel { path: path(), problem })

@@ -26,12 +26,11 @@ pub(super) struct SecondOrder {
     pub(super) designed: f64,
 }
 
-/// The best cutoff on a plant with one input and one output; `None` where none stabilises it.
-pub(super) fn second_order(pid: &PidExport, plant: &StateSpace<Discrete>) -> Result<Option<SecondOrder>> {
+/// The best cutoff on a plant with one input and one output, from that of the design, Hz, up; `None` where none stabilises it.
+pub(super) fn second_order(pid: &PidExport, plant: &StateSpace<Discrete>, first: f64) -> Result<Option<SecondOrder>> {
     let [d0, d1] = pid.derivative;
     let time = plant.time();
     let designed = peak_sensitivity(plant, &law(pid, (vec![d0, -d0], vec![1.0, -d1]), time)?)?;
-    let first = 0.5 / (std::f64::consts::PI * pid.derivative_filter);
     let cutoffs = (0..CUTOFFS).map(|k| first * STEP.powi(k as i32)).filter(|hz| hz * pid.ts < LARGEST);
     let of = |hz: f64| Some((hz, peak_sensitivity(plant, &law(pid, butterworth(pid, hz), time).ok()?).ok()?));
     let best = cutoffs.filter_map(of).min_by(|a, b| a.1.total_cmp(&b.1));

@@ -180,7 +180,7 @@ impl Records<'_> {
         let at = failed.iter().filter(|[low, high]| low == high).map(|[hz, _]| hz * self.time.ts());
         let apart = |turns: f64| at.clone().all(|at| witness.shows_between(turns, at));
         let shown = |turns: f64| if *informed { apart(turns) } else { witness.shows(turns) };
-        let damped = |turns: f64| is_damped(self.all, &found.solution.chosen, turns);
+        let damped = is_damped(self.all, &found.solution.chosen);
         if let Some(without) = without_unseen(self.all, found, &damped, candidates) {
             return Some((without, 1.0));
         }

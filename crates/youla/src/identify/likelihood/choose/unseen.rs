@@ -41,9 +41,9 @@ impl WithoutUnseen {
 
 /// Whether a mode, at a share of the sample rate, is no disturbance at one frequency: a pole of the loop outside of the unit circle that the feedback
 /// does not move.
-pub(crate) fn is_damped(all: &Problem<'_>, choice: &Choice, turns: f64) -> bool {
-    let resolved = 1.0 / all.samples().0 as f64;
-    all.poles_outside(choice).iter().all(|(z, _)| (z.arg().abs() / TAU - turns).abs() > resolved)
+pub(crate) fn is_damped(all: &Problem<'_>, choice: &Choice) -> impl Fn(f64) -> bool {
+    let (resolved, outside) = (1.0 / all.samples().0 as f64, all.poles_outside(choice));
+    move |turns| outside.iter().all(|(z, _)| (z.arg().abs() / TAU - turns).abs() > resolved)
 }
 
 /// The model without the modes at frequencies, shares of the sample rate, at which the excitation does not show it; `None` where there are none,

@@ -188,8 +188,8 @@ impl Directions {
 
     /// The same with the errors of the rivals of another structure that draws of the region meet, as those of the model on the lines of their dead times.
     pub(crate) fn with_spreads(mut self, problem: &Problem<'_>, solution: &Solution) -> Self {
-        let of = |(model, delays, weight): &(Model, Vec<usize>, f64)| {
-            let is_drawn = weight * weight > LEAST_DRAWN && self.is_other(model, delays) && !separable(model.outputs);
+        let of = |(model, delays, root): &(Model, Vec<usize>, f64)| {
+            let is_drawn = root * root > LEAST_DRAWN && !separable(model.outputs);
             let drawn =
                 || solution.weighed().map(|(c, _)| c).find(|c| c.delays == *delays && c.found.point.model == *model);
             let choice = is_drawn.then(drawn).flatten()?;
@@ -199,7 +199,7 @@ impl Directions {
             let root = Root::new(&spectra, &found.point, &chart, &found.noise, &Nuisance::default());
             Some(root.scaled(self.scatter.sqrt()).entries(&chart, model))
         };
-        self.spreads = self.rivals.iter().enumerate().filter_map(|(place, rival)| Some((place, of(rival)?))).collect();
+        self.spreads = self.others().filter_map(|(place, rival)| Some((place, of(rival)?))).collect();
         self
     }
 
@@ -215,8 +215,12 @@ impl Directions {
 
     /// Models of another structure that the record does not distinguish, with their dead times and weights.
     pub(crate) fn rivals(&self) -> impl Iterator<Item = (&Model, &[usize], f64)> {
-        let others = self.rivals.iter().filter(|(model, delays, _)| self.is_other(model, delays));
-        others.map(|(model, delays, root)| (model, delays.as_slice(), root * root))
+        self.others().map(|(_, (model, delays, root))| (model, delays.as_slice(), root * root))
+    }
+
+    /// The same with their places and the roots of their weights.
+    fn others(&self) -> impl Iterator<Item = (usize, &(Model, Vec<usize>, f64))> {
+        self.rivals.iter().enumerate().filter(|(_, (model, delays, _))| self.is_other(model, delays))
     }
 
     fn is_other(&self, model: &Model, delays: &[usize]) -> bool {
@@ -228,8 +232,7 @@ impl Directions {
     pub(crate) fn rival_at(&self, chance: f64) -> Option<usize> {
         let all: f64 = self.rivals().map(|(.., weight)| weight).sum();
         let (share, mut passed) = (if all > 0.5 { 0.5 / all } else { 1.0 }, 0.0);
-        let mut others = self.rivals.iter().enumerate().filter(|(_, (model, delays, _))| self.is_other(model, delays));
-        others.find_map(|(place, (.., root))| {
+        self.others().find_map(|(place, (.., root))| {
             passed += root * root * share;
             (chance < passed).then_some(place)
         })
@@ -238,6 +241,11 @@ impl Directions {
     /// Number of the errors of the model, or of the rival at a place.
     pub(crate) fn errors_of(&self, rival: Option<usize>) -> usize {
         rival.map_or_else(|| self.errors(), |place| self.spread(place).map_or(0, Mat::ncols))
+    }
+
+    /// The model, or the rival at a place, without errors.
+    pub(crate) fn centre(&self, rival: Option<usize>) -> &Model {
+        rival.map_or(&self.model, |place| &self.rivals[place].0)
     }
 
     fn spread(&self, place: usize) -> Option<&Mat<f64>> {

@@ -226,7 +226,8 @@ impl Region {
         // the lowest frequency is that of one period in the records
         let radius = 1.0 + OUTSIDE * self.hz.first().map_or(0.0, |hz| hz * self.time.ts());
         let outside = |model: &Model| model.poles().iter().filter(|pole| pole.norm() > radius).count();
-        let allowed = |rival| outside(&self.directions.drawn(rival, &vec![0.0; self.directions.errors_of(rival)]).0);
+        let of_model = outside(self.directions.centre(None));
+        let allowed = |rival: Option<usize>| rival.map_or(of_model, |_| outside(self.directions.centre(rival)));
         let draw = |place: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(place);

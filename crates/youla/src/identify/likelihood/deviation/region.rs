@@ -221,24 +221,31 @@ impl Region {
 
     /// Plants as the estimate could have come out, in the order of drawing: the parameters are normal, but no more poles than those of the estimate
     /// lie outside of the unit circle; a model of another structure that the records do not distinguish comes with the frequency of its weight, in
-    /// half of the draws at most, with its own errors. A draw depends on the seed and its place only.
+    /// half of the draws at most, with its own errors, of which no slow pole covers half of its distance to the circle: those of a lag that is hardly
+    /// seen are not of first order beyond. A draw depends on the seed and its place only.
     pub fn draws(&self, count: usize, seed: u64) -> Vec<Draw> {
         // the lowest frequency is that of one period in the records
         let radius = 1.0 + OUTSIDE * self.hz.first().map_or(0.0, |hz| hz * self.time.ts());
-        let outside = |model: &Model| model.poles().iter().filter(|pole| pole.norm() > radius).count();
-        let of_model = outside(self.directions.centre(None));
-        let allowed = |rival: Option<usize>| rival.map_or(of_model, |_| outside(self.directions.centre(rival)));
+        let outside = |model: &Model, limit: f64| model.poles().iter().filter(|pole| pole.norm() > limit).count();
+        let of_model = (outside(self.directions.centre(None), radius), radius);
+        let of_rival = |rival| {
+            let centre: &Model = self.directions.centre(rival);
+            let slowest = centre.poles().iter().map(|pole| pole.norm()).filter(|r| *r <= radius).fold(0.0, f64::max);
+            let limit = if slowest < 2.0 - radius { 1.0 - 0.5 * (1.0 - slowest) } else { radius };
+            (outside(centre, limit), limit)
+        };
+        let allowed = |rival: Option<usize>| rival.map_or(of_model, |_| of_rival(rival));
         let draw = |place: u64| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(place);
             let chance: f64 = rng.random();
             let rival = self.directions.rival_at(chance);
-            let (count, allowed) = (self.directions.errors_of(rival), allowed(rival));
+            let (count, (allowed, limit)) = (self.directions.errors_of(rival), allowed(rival));
             let drawn = || (0..count).map(|_| rng.sample(StandardNormal)).collect::<Vec<f64>>();
             let (errors, (model, delays)) = std::iter::repeat_with(drawn)
                 .take(REDRAWN)
                 .map(|errors| (self.directions.drawn(rival, &errors), errors))
-                .find_map(|(moved, errors)| (outside(&moved.0) <= allowed).then_some((errors, moved)))?;
+                .find_map(|(moved, errors)| (outside(&moved.0, limit) <= allowed).then_some((errors, moved)))?;
             let distance = errors.iter().map(|e| e * e).sum::<f64>().sqrt();
             let plant = physical::realised(&model, delays, &self.sizes, self.time).ok()?;
             Some(Draw { plant, distance })

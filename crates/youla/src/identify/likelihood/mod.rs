@@ -207,7 +207,6 @@ impl Records<'_> {
         let nuisance = found.nuisance(&problem, choice, &spectra);
         let scatter = (widening * parts.scatter, &nuisance);
         let directions = Directions::new(&spectra, solution, scatter, witness.clone())
-            .with_spreads(&problem, solution)
             .with(nonlinear_parts, self.interpolated.clone());
         let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
         let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);

@@ -20,25 +20,20 @@ pub(crate) mod root;
 mod stored;
 
 use crate::identify::likelihood::choose::loads::Nuisance;
-use crate::identify::likelihood::choose::problem::{Choice, Problem, Solution};
+use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::search::DAMPED;
 use crate::identify::likelihood::search::chart::Chart;
-use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::separable::separable;
 use crate::identify::verdict::limits::{BEYOND_CHANCE, LARGEST_IN_BAND};
 use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
-use faer::{ColRef, Mat, c64};
+use faer::{Mat, c64};
 use interpolation::Interpolated;
 use response_error::ResponseError;
 use root::Root;
 
 /// Rivals of less weight are left out.
 const LEAST_WEIGHT: f64 = 1e-12;
-/// Weight of a rival from which its errors are drawn: of 500 draws five are of it.
-const LEAST_DRAWN: f64 = 0.01;
 
 /// Inverse of the leading triangle of `[R r; 0 *]` with columns of unit length, and these lengths; directions that the record
 /// does not determine are left large.
@@ -90,8 +85,6 @@ pub(crate) struct Directions {
     root: Root,
     /// Models that the record does not distinguish, with the roots of their weights.
     rivals: Vec<(Model, Vec<usize>, f64)>,
-    /// Independent errors of the rivals, by their places: entries of (A, B, C) of each block and of D by errors.
-    spreads: Vec<(usize, Mat<f64>)>,
     /// Variance of the parameters by their scatter over pieces of the records, in units of that of the noise; it is in `root`.
     scatter: f64,
     /// The errors that the excitation shows: distortion, differences between groups of records, and between records and fresh ones.
@@ -164,7 +157,6 @@ impl Directions {
             chart,
             root,
             rivals,
-            spreads: Vec::new(),
             scatter: 1.0,
             seen: None,
             of_another_form: Vec::new(),
@@ -186,23 +178,6 @@ impl Directions {
         Directions { seen, of_another_form, ..self }
     }
 
-    /// The same with the errors of the rivals of another structure that draws of the region meet, as those of the model on the lines of their dead times.
-    pub(crate) fn with_spreads(mut self, problem: &Problem<'_>, solution: &Solution) -> Self {
-        let of = |(model, delays, root): &(Model, Vec<usize>, f64)| {
-            let is_drawn = root * root > LEAST_DRAWN && !separable(model.outputs);
-            let drawn =
-                || solution.weighed().map(|(c, _)| c).find(|c| c.delays == *delays && c.found.point.model == *model);
-            let choice = is_drawn.then(drawn).flatten()?;
-            let (spectra, found) = (problem.spectra(delays), &choice.found);
-            let spectra = grouped(&spectra, &found.point, DAMPED).unwrap_or(spectra);
-            let chart = Chart::new(model, found.feedthrough);
-            let root = Root::new(&spectra, &found.point, &chart, &found.noise, &Nuisance::default());
-            Some(root.scaled(self.scatter.sqrt()).entries(&chart, model))
-        };
-        self.spreads = self.others().filter_map(|(place, rival)| Some((place, of(rival)?))).collect();
-        self
-    }
-
     /// Independent errors of the parameters.
     pub(crate) fn errors(&self) -> usize {
         self.root.errors()
@@ -215,53 +190,21 @@ impl Directions {
 
     /// Models of another structure that the record does not distinguish, with their dead times and weights.
     pub(crate) fn rivals(&self) -> impl Iterator<Item = (&Model, &[usize], f64)> {
-        self.others().map(|(_, (model, delays, root))| (model, delays.as_slice(), root * root))
+        let others = |(model, delays, _): &&(Model, Vec<usize>, f64)| {
+            model.order() != self.model.order() || *delays != self.delays
+        };
+        self.rivals.iter().filter(others).map(|(model, delays, root)| (model, delays.as_slice(), root * root))
     }
 
-    /// The same with their places and the roots of their weights.
-    fn others(&self) -> impl Iterator<Item = (usize, &(Model, Vec<usize>, f64))> {
-        self.rivals.iter().enumerate().filter(|(_, (model, delays, _))| self.is_other(model, delays))
-    }
-
-    fn is_other(&self, model: &Model, delays: &[usize]) -> bool {
-        model.order() != self.model.order() || *delays != self.delays
-    }
-
-    /// The place of the rival that a number between 0 and 1 picks, with the frequency of its weight, and of all together at most half: Akaike's criterion
+    /// The rival that a number between 0 and 1 picks, with the frequency of its weight, and of all together at most half: Akaike's criterion
     /// weighs lags, that of Schwarz has chosen. `None` for the model itself.
-    pub(crate) fn rival_at(&self, chance: f64) -> Option<usize> {
+    pub(crate) fn rival_at(&self, chance: f64) -> Option<(&Model, &[usize])> {
         let all: f64 = self.rivals().map(|(.., weight)| weight).sum();
         let (share, mut passed) = (if all > 0.5 { 0.5 / all } else { 1.0 }, 0.0);
-        self.others().find_map(|(place, (.., root))| {
-            passed += root * root * share;
-            (chance < passed).then_some(place)
+        self.rivals().find_map(|(model, delays, weight)| {
+            passed += weight * share;
+            (chance < passed).then_some((model, delays))
         })
-    }
-
-    /// Number of the errors of the model, or of the rival at a place.
-    pub(crate) fn errors_of(&self, rival: Option<usize>) -> usize {
-        rival.map_or_else(|| self.errors(), |place| self.spread(place).map_or(0, Mat::ncols))
-    }
-
-    /// The model, or the rival at a place, without errors.
-    pub(crate) fn centre(&self, rival: Option<usize>) -> &Model {
-        rival.map_or(&self.model, |place| &self.rivals[place].0)
-    }
-
-    fn spread(&self, place: usize) -> Option<&Mat<f64>> {
-        self.spreads.iter().find(|(of, _)| *of == place).map(|(_, spread)| spread)
-    }
-
-    /// [`Self::moved`] of the model, or of the rival at a place.
-    pub(crate) fn drawn(&self, rival: Option<usize>, errors: &[f64]) -> (Model, &[usize]) {
-        let Some(place) = rival else { return self.moved(errors) };
-        let (model, delays, _) = &self.rivals[place];
-        let mut model = model.clone();
-        if let Some(spread) = self.spread(place) {
-            let step = spread * ColRef::from_slice(errors);
-            model.entries_mut().zip(step.iter()).for_each(|(entry, step)| *entry += step);
-        }
-        (model, delays)
     }
 
     /// The error of the response, scaled channels, under the friction and the play of the records: the loop ran with both. Below one period of the

@@ -84,14 +84,6 @@ impl Root {
         Root { shared: self.shared * Scale(by), own, places: self.places }
     }
 
-    /// The change of the entries of (A, B, C) of each block and of D by each error.
-    pub(super) fn entries(&self, chart: &Chart, model: &Model) -> Mat<f64> {
-        let unit = |k: usize| (0..self.errors()).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-        let of = |k: usize| chart.change(model, &self.step(&unit(k))).entries_mut().map(|v| *v).collect::<Vec<f64>>();
-        let columns: Vec<Vec<f64>> = (0..self.errors()).map(of).collect();
-        Mat::from_fn(columns.first().map_or(0, Vec::len), columns.len(), |i, k| columns[k][i])
-    }
-
     /// Number of errors.
     pub(crate) fn errors(&self) -> usize {
         self.own.iter().map(Mat::ncols).sum::<usize>() + self.shared.ncols()

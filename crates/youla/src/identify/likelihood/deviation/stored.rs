@@ -30,8 +30,6 @@ pub(super) struct StoredRegion {
     feedthrough: bool,
     root: StoredMatrix,
     rivals: Vec<(Model, Vec<usize>, f64)>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    spreads: Vec<(usize, StoredMatrix)>,
     scatter: f64,
     seen: Option<[Excess; 3]>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -78,7 +76,6 @@ impl From<Region> for StoredRegion {
             model: d.model,
             delays: d.delays,
             rivals: d.rivals,
-            spreads: d.spreads.iter().map(|(place, spread)| (*place, StoredMatrix::from(spread))).collect(),
             scatter: d.scatter,
             seen: d.seen,
             nonlinear: d.nonlinear,
@@ -125,11 +122,6 @@ impl TryFrom<StoredRegion> for Region {
         let shared = stored.root.of_rows(chart.parameters()).ok_or(refused)?;
         let own = stored.own.iter().map(|of| of.of_rows(of.rows)).collect::<Option<_>>().ok_or(refused)?;
         let root = Root::of_parts(shared, own, &chart, &stored.model).ok_or(refused)?;
-        let spread = |(place, of): &(usize, StoredMatrix)| {
-            let entries = stored.rivals.get(*place)?.0.clone().entries_mut().count();
-            Some((*place, of.of_rows(entries)?))
-        };
-        let spreads = stored.spreads.iter().map(spread).collect::<Option<_>>().ok_or(refused)?;
         let time = Discrete::new(stored.ts).map_err(|_| "this region has no sample time; identify the run again")?;
         let directions = Directions {
             model: stored.model,
@@ -137,7 +129,6 @@ impl TryFrom<StoredRegion> for Region {
             chart,
             root,
             rivals: stored.rivals,
-            spreads,
             scatter: stored.scatter,
             seen: None,
             of_another_form: Vec::new(),

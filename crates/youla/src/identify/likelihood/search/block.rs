@@ -4,7 +4,7 @@ use crate::linalg::real_schur;
 use faer::{Mat, c64};
 
 /// One block of s states.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Block {
     /// Number of states s.

@@ -211,7 +211,8 @@ impl Chart {
     /// The change of the entries of a model by a step.
     pub(crate) fn change(&self, model: &Model, step: &[f64]) -> Model {
         let mut nothing = model.clone();
-        nothing.entries_mut().for_each(|entry| *entry = 0.0);
+        let entries = nothing.blocks.iter_mut().flat_map(|b| [&mut b.a, &mut b.b, &mut b.c]);
+        entries.chain([&mut nothing.d]).for_each(|entries| entries.fill(0.0));
         self.moved(&nothing, step)
     }
 

@@ -19,7 +19,7 @@ const INTEGRATOR: f64 = 1.0 - 0.1 * LEAST_EXCESS;
 const SLOW: f64 = 0.05;
 
 /// `y = sum of C_i (z I - A_i)^-1 B_i u + D u`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Model {
     /// Inputs m.
@@ -33,12 +33,6 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    /// The entries of (A, B, C) of each block, and of D.
-    pub(crate) fn entries_mut(&mut self) -> impl Iterator<Item = &mut f64> {
-        let of_blocks = self.blocks.iter_mut().flat_map(|block| [&mut block.a, &mut block.b, &mut block.c]);
-        of_blocks.chain([&mut self.d]).flatten()
-    }
-
     /// The blocks of A, B, C; `None` where A has no Schur form.
     pub(crate) fn of(a: MatRef<'_, f64>, b: MatRef<'_, f64>, c: MatRef<'_, f64>, d: Vec<f64>) -> Option<Self> {
         Model::formed([a, b, c], d, true)

@@ -3,8 +3,11 @@
 use crate::common::{self, rng};
 use faer::Scale;
 use std::cell::Cell;
-use youla::control::{LqrWeights, NoiseCovariance, RunningController, kalman, lqr, real_time_controller};
-use youla::factor::CoprimeFactors;
+use youla::control::{
+    ChannelScales, LqrWeights, NoiseCovariance, RunningController, closed_loop, kalman, lqr, real_time_controller,
+    with_input_port,
+};
+use youla::factor::{CoprimeFactors, loop_factors};
 use youla::identify::Identified;
 use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::{Experiment, InitialState, Order, SubspaceMethod, SubspaceOptions, subspace};
@@ -16,7 +19,10 @@ use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
-use youla_loop::redesign::{Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
+use youla_loop::redesign::{
+    Redesign, RedesignMethod, RedesignOptions, RedesignProblem, disturbance_response, least_damping, loop_modes,
+    redesign,
+};
 use youla_twin::rig::{
     Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, RigParameters, SimulatedRig,
     bearing_at_speed, degraded, run_experiment,
@@ -185,6 +191,7 @@ fn designed(
         region: Some(&found.model.region),
         input_size: &sizes[0],
         output_size: &sizes[1],
+        delay: 0,
     };
     (redesign(&problem, options).unwrap(), sizes)
 }
@@ -206,6 +213,7 @@ fn exported_data_are_the_controller() {
         region: None,
         input_size: &[0.5; 2],
         output_size: &[1.0; 2],
+        delay: 0,
     };
     let channels =
         |name: &str, unit: &str| vec![Channel::new(format!("{name}_h"), unit), Channel::new(format!("{name}_v"), unit)];
@@ -303,4 +311,38 @@ fn damping_rises_as_predicted_on_an_unstable_rotor() {
     near(before.damping, new.present.least_damping, 0.1);
     near(after.damping, new.predicted.least_damping, 0.15);
     assert!(after.damping > 3.0 * before.damping);
+}
+
+/// A resonance behind a machine that delays the commands of its controller by three samples.
+#[test]
+fn the_delay_of_a_machine_is_designed_for() {
+    let time = Discrete::new(1e-3).unwrap();
+    let [of_plant, of_running] =
+        [[vec![0.0, 0.05, 0.05], vec![1.0, -1.94, 0.98]], [vec![0.0, 0.0, 0.0, -0.02], vec![1.0]]]
+            .map(|[b, a]| StateSpace::difference_equation(&vec![vec![b]], &vec![vec![a]], time).unwrap());
+    let sizes = ChannelScales::new(vec![1.0], vec![1.0]).unwrap();
+    let factors = loop_factors(&of_plant, &RunningController::new(of_running), &sizes).unwrap();
+    let problem = |delay| RedesignProblem {
+        plant: &of_plant,
+        model: &of_plant,
+        factors: &factors,
+        region: None,
+        input_size: &[1.0],
+        output_size: &[1.0],
+        delay,
+    };
+    let options = RedesignOptions { input_weights: vec![30.0], ..RedesignOptions::default() };
+    let new = redesign(&problem(3), &options).unwrap();
+    let behind = |k: &StateSpace<Discrete>| {
+        let delayed = k.clone().delayed(3).unwrap();
+        let poles = closed_loop(&of_plant, &with_input_port(&delayed).unwrap()).unwrap().poles().unwrap();
+        poles.iter().map(|p| p.norm()).fold(0.0, f64::max)
+    };
+    assert_eq!(new.controller.system, new.controller.computed.clone().delayed(3).unwrap());
+    assert!(new.gains_damping() && behind(&new.controller.computed) < 0.99, "{}", behind(&new.controller.computed));
+    // A design that knows nothing of the delay loses the damping that it promises.
+    let blind = redesign(&problem(0), &options).unwrap();
+    let kept = disturbance_response(&of_plant, &blind.controller.computed.clone().delayed(3).unwrap()).unwrap();
+    let kept = least_damping(&loop_modes(&kept).unwrap());
+    assert!(kept < 0.5 * blind.predicted.least_damping, "{kept} {}", blind.predicted.least_damping);
 }

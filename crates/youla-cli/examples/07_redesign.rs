@@ -28,6 +28,7 @@ fn main() -> Result<()> {
         region: Some(&found.region),
         input_size: &rms(&log.u),
         output_size: &rms(&log.y),
+        delay: 0,
     };
     let new = redesign(&problem, &RedesignOptions::default())?;
     println!(

@@ -105,6 +105,7 @@ fn new_loop(running: &RunningLoop, model: &Recommendation, sizes: Sizes<'_>, wan
         region: Some(&model.region),
         input_size: sizes.input,
         output_size: sizes.output,
+        delay: 0,
     };
     let mut weights = RedesignOptions::default().input_weights;
     weights.sort_by(f64::total_cmp);

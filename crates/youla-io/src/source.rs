@@ -2,12 +2,12 @@
 
 use crate::assemble::only;
 use crate::choose::{ChannelRef, ChannelSpec};
-use crate::csv::{CsvOptions, read_csv_parts, require_seconds};
+use crate::csv::{CsvOptions, leading_clock, read_csv_parts, require_seconds};
 use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::{self, read_npz};
 use crate::open::open;
-use crate::time::TimeSource;
+use crate::time::{TimeSource, is_clock, require_agreement};
 use hmac_sha256::Hash;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -82,10 +82,29 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
         Format::Mat => read_mat(&source.path)?,
         Format::Npz => read_npz(&source.path)?,
         Format::Csv | Format::Detect => {
+            if let Some((column, times)) = leading_clock(&source.path, &source.csv)? {
+                agree(source, &column, || Ok(times))?;
+            }
             return read_csv_parts(&source.path, &source.channels, &source.time, &source.csv);
         }
     };
+    for clock in variables.leaves().iter().filter(|path| is_clock(path.rsplit('.').next().unwrap_or(path))) {
+        agree(source, clock, || variables.column(clock))?;
+    }
     variables.record_parts(&source.channels, &source.time)
+}
+
+/// Refuses a clock in the file that is not used and contradicts the declared sample time.
+fn agree(source: &Source, column: &str, times: impl FnOnce() -> Result<Vec<f64>>) -> Result<()> {
+    let used = source.channels.iter().any(|channel| channel.source().to_string() == column);
+    match (&source.time.column, source.time.ts, used) {
+        (None, Some(ts), false) => {
+            // What is no column of numbers is no clock.
+            let times = times().unwrap_or_default();
+            require_agreement(&source.path.display().to_string(), column, &times, ts)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a time column in another unit than the second, by its name or a line of units in the file, before anything else is read.

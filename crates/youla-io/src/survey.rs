@@ -5,16 +5,12 @@ use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::read_npz;
 use crate::source::{Format, Source, resolve};
-use crate::time::TimeSource;
+use crate::time::{TimeSource, uniform_step};
 use crate::values::{Value, Variables};
 use std::path::Path;
-use youla::signal::StampSteps;
 
 /// Most columns of a matrix in a file that are listed one by one.
 const MOST_COLUMNS: usize = 64;
-
-/// Greatest deviation of a step of a clock, as a part of the mean step.
-const UNIFORM: f64 = 1e-3;
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,12 +110,6 @@ fn column(from: String, values: &[f64]) -> SurveyedColumn {
         from,
         content: Ok(ColumnContent { rows: values.len(), low, high, step: uniform_step(values), rises }),
     }
-}
-
-fn uniform_step(values: &[f64]) -> Option<f64> {
-    let steps = StampSteps::of(values, UNIFORM)?;
-    let even = values.windows(2).all(|pair| (pair[1] - pair[0] - steps.mean).abs() <= steps.slack);
-    (steps.mean > 0.0 && even).then_some(steps.mean)
 }
 
 #[cfg(test)]

@@ -41,6 +41,13 @@ const UNITS: [(&[&str], &str, &str); 5] = [
 /// assert_eq!(youla_io::unit_of_time("systems"), None);
 /// ```
 pub fn unit_of_time(heading: &str) -> Option<(&'static str, &'static str)> {
+    let words = words_of(heading);
+    let found = UNITS.iter().find(|(names, ..)| words.split(' ').any(|word| names.contains(&word)));
+    found.map(|&(_, unit, to_seconds)| (unit, to_seconds))
+}
+
+/// The words of a heading in small letters, a blank between two.
+fn words_of(heading: &str) -> String {
     let mut words = String::new();
     for c in heading.chars() {
         if c.is_uppercase() && words.ends_with(char::is_lowercase) {
@@ -48,9 +55,45 @@ pub fn unit_of_time(heading: &str) -> Option<(&'static str, &'static str)> {
         }
         words.push(if c.is_alphanumeric() { c } else { ' ' });
     }
-    let words = words.to_lowercase();
-    let found = UNITS.iter().find(|(names, ..)| words.split(' ').any(|word| names.contains(&word)));
-    found.map(|&(_, unit, to_seconds)| (unit, to_seconds))
+    words.to_lowercase()
+}
+
+/// Words by which a column names itself a clock.
+const CLOCKS: [&str; 7] = ["t", "time", "timestamp", "zeit", "temps", "tiempo", "tempo"];
+
+/// Whether a column names itself a clock.
+pub(super) fn is_clock(heading: &str) -> bool {
+    words_of(heading).split(' ').any(|word| CLOCKS.contains(&word))
+}
+
+/// How many of the units of a clock a second, or a tick of 100 ns, is made of.
+const PER_SECOND: [f64; 7] = [1.0, 1e3, 1e6, 1e7, 1e9, 1.0 / 60.0, 1.0 / 3600.0];
+
+/// Refuses a column of a file that names itself a clock, rises evenly, and contradicts the declared sample time in every unit of time; a
+/// counter of rows rises by 1.
+pub(super) fn require_agreement(what: &str, column: &str, times: &[f64], ts: f64) -> Result<()> {
+    let Some(step) = uniform_step(times) else { return Ok(()) };
+    let near = |expected: f64| (step / expected - 1.0).abs() < UNIFORM;
+    if near(1.0) || PER_SECOND.iter().any(|units| near(units * ts)) {
+        return Ok(());
+    }
+    let problem = format!(
+        "column {column:?} rises by {} in each row, but the sample time is declared as {} s; correct sample_time in [data] (--sample-time), or name \
+         the column instead of it (time_column, --time); give the column another name in the file where it is no clock",
+        Seconds(step),
+        Seconds(ts)
+    );
+    Err(Error::Clock { what: what.to_owned(), problem })
+}
+
+/// Greatest deviation of a step of a clock that rises evenly, as a part of the mean step.
+const UNIFORM: f64 = 1e-3;
+
+/// The mean step of a column that rises evenly.
+pub(super) fn uniform_step(values: &[f64]) -> Option<f64> {
+    let steps = StampSteps::of(values, UNIFORM)?;
+    let even = values.windows(2).all(|pair| (pair[1] - pair[0] - steps.mean).abs() <= steps.slack);
+    (steps.mean > 0.0 && even).then_some(steps.mean)
 }
 
 /// Refuses a column of the time where `heading`, its name or its cell of a line of units, states another unit than the second.

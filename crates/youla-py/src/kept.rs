@@ -141,14 +141,14 @@ pub(crate) fn redesign<'py>(
     Ok((promised, model_out(py, &new.controller.system)))
 }
 
-/// One PID for several runs that were kept: the settings and records of the first, and plant and region of each, and whether all are trusted.
+/// One PID for several runs that were kept: the settings and records of the first, and plant and region of each, and what speaks against any.
 #[pyfunction]
 pub(crate) fn redesign_pid<'py>(
     py: Python<'py>,
     chosen: Options,
     logs: Vec<Log<'py>>,
     points: Vec<(ModelIn<'py>, PyRef<'py, Region>)>,
-    trusted: bool,
+    doubts: Vec<String>,
     choices: Options,
 ) -> PyResult<(String, ModelOut<'py>)> {
     let (chosen, logs) = (chosen.settings()?, records(py, logs)?);
@@ -157,7 +157,7 @@ pub(crate) fn redesign_pid<'py>(
     let new = worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;
         let points = points.iter().map(|(plant, region)| (plant, region)).collect();
-        Ok(pid_kept(&chosen, &records, points, trusted, &choices.of("redesign")?)?)
+        Ok(pid_kept(&chosen, &records, points, doubts, &choices.of("redesign")?)?)
     })?;
     let promised = serde_json::to_string(&youla_run::PidEntry::from(&new)).map_err(Failure::from)?;
     Ok((promised, model_out(py, &new.system)))

@@ -8,6 +8,7 @@ use crate::stages::certificate::RunCertificate;
 use crate::stages::factors::{DeclaredLoop, LoopFactors};
 use crate::stages::grey_box::GreyBoxRun;
 use crate::stages::nonparametric::LinesOfRun;
+use crate::stages::redesign::doubts;
 use crate::stages::reduction::RunReduction;
 use crate::stages::signals::DeviationSignals;
 use crate::stages::uncertainty::SystemUncertainty;
@@ -165,13 +166,18 @@ impl Identification {
         found(self.pid.as_ref())
     }
 
+    /// What speaks against a design on this run, a sentence each: a model that is not trusted, a stated controller that is not the one in the log.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        doubts(self.recommended.as_ref().ok(), &self.data)
+    }
+
     /// Why the new controller that was asked for is not there or should not be taken.
     pub fn redesign_reservation(&self) -> Option<String> {
         let asked = self.settings.redesign.as_ref()?;
         let reasons = match (&self.pid, &self.redesign, asked.structure) {
             (Some(Err(error)), ..) | (_, Some(Err(error)), None) => error.to_string(),
             (Some(Ok(new)), ..) => new.reservations().join("; "),
-            (_, Some(Ok(_)), None) => String::new(),
+            (_, Some(Ok(new)), None) => [self.doubts(), new.reservations()].concat().join("; "),
             (None, _, Some(_)) => "[redesign] structure needs the recommended model, which this run lacks".into(),
             (_, None, None) => {
                 "[redesign] needs the recommended model and coprime factors, which this run lacks".into()

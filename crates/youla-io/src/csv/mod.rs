@@ -13,7 +13,7 @@ mod write;
 
 pub use options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 pub use read::{StampedColumn, csv_from_bytes, read_csv, read_stamped_csv};
-pub(crate) use read::{read_csv_parts, read_each, require_seconds};
+pub(crate) use read::{leading_clock, read_csv_parts, read_each, require_seconds};
 pub(crate) use write::csv_to_bytes;
 pub use write::write_csv;
 

@@ -75,6 +75,11 @@ impl Fields {
         &self.names
     }
 
+    /// The number in a column of a line.
+    pub(super) fn number(&self, line: &[u8], column: usize) -> Option<f64> {
+        number(self.cells(line).get(column)?, self.decimal)
+    }
+
     /// The cells of a line.
     fn cells<'b>(&self, line: &'b [u8]) -> Vec<&'b [u8]> {
         match self.delimiter {

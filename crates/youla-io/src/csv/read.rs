@@ -7,7 +7,7 @@ use super::plan::Plan;
 use crate::assemble::only;
 use crate::choose::{ChannelRef, ChannelSpec};
 use crate::error::Result;
-use crate::time::TimeSource;
+use crate::time::{TimeSource, is_clock};
 use std::io::Cursor;
 use std::path::Path;
 use youla::signal::Record;
@@ -85,6 +85,25 @@ fn read_columns(
     let plan = Plan::new(lines.path(), fields.names(), channels, time)?;
     let columns = Selection::new(&fields, &plan.columns).read(&fields, lines)?;
     Ok((plan, columns))
+}
+
+/// Rows of a clock that are compared with a declared sample time.
+/// Chosen, not measured.
+const COMPARED: usize = 1000;
+
+/// The first rows of the column that names itself a clock, with its name.
+pub(crate) fn leading_clock(path: &Path, options: &CsvOptions) -> Result<Option<(String, Vec<f64>)>> {
+    let mut lines = Lines::open(path)?;
+    let fields = Fields::detect(&mut lines, options)?;
+    let Some(column) = fields.names().iter().position(|name| is_clock(name)) else { return Ok(None) };
+    let mut times = Vec::new();
+    while times.len() < COMPARED && lines.advance()? {
+        match fields.number(lines.current(), column) {
+            Some(time) => times.push(time),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some((fields.names()[column].clone(), times)))
 }
 
 /// All columns with their names, `#1`, `#2` and so on where the file has none; an error for one that holds more than numbers.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::error::{CorruptAt, Error, Result};
 use crate::scratch::{data_folder, scratch};
-use crate::{ChannelRef, ChannelSpec, TimeSource};
+use crate::{ChannelRef, ChannelSpec, Format, Source, TimeSource};
 use proptest::prelude::*;
 use std::io::Write;
 use youla::Mat;
@@ -275,5 +275,28 @@ mod dialects {
             let found = sentence(text, delimiter, decimal);
             assert!(found.starts_with(expected), "{found}");
         }
+    }
+}
+
+/// A clock that nobody named contradicts a declared sample time; milliseconds, counters of rows and other columns do not.
+#[test]
+fn a_clock_that_is_not_used_must_agree_with_the_declared_sample_time() {
+    let file = scratch("csv");
+    let read_with = |heading: &str, step: f64, ts: f64| {
+        let rows: String = (0..50).map(|k| format!("{},{}\n", 3.0 + step * f64::from(k), k % 7)).collect();
+        std::fs::write(file.path(), format!("{heading},y\n{rows}")).unwrap();
+        let (channels, csv) = (vec![ChannelSpec::named("y")], CsvOptions::default());
+        let source =
+            Source { path: file.path().to_owned(), format: Format::Detect, time: TimeSource::ts(ts), channels, csv };
+        crate::read(&source).map(|record| record.samples())
+    };
+    for (heading, step, ts) in
+        [("t", 0.002, 0.002), ("time [ms]", 2.0, 0.002), ("Zeit", 1.0, 0.002), ("ramp", 0.001, 0.002)]
+    {
+        assert_eq!(read_with(heading, step, ts).unwrap(), 50, "{heading}");
+    }
+    for (heading, step, ts) in [("t", 0.001, 0.002), ("time [ms]", 2.0, 2.0), ("timestampUs", 500.0, 0.001)] {
+        let refused = read_with(heading, step, ts).unwrap_err().to_string();
+        assert!(refused.contains(heading) && refused.contains("sample_time"), "{refused}");
     }
 }

@@ -26,6 +26,9 @@ impl Severity {
     }
 }
 
+/// Share of the input up to which a change of the controller explains the log; the default of `CheckOptions::controller_caution`.
+const EXPLAINS: f64 = 0.01;
+
 /// A test of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -98,6 +101,14 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// Whether it names a change of the stated controller, or of the roles, units and signs of its channels, that explains the log. A limit of
+    /// the input and a drift of the outputs are no such change.
+    pub fn shows_another_controller(&self) -> bool {
+        let has = |key: &str| self.numbers.contains_key(key);
+        let explains = self.numbers.get("residual_after").is_some_and(|left| *left <= EXPLAINS);
+        self.test == Test::Controller && explains && !has("saturation") && !has("trend")
+    }
+
     pub(super) fn new(test: Test, severity: Severity, record: &str, what: String) -> Self {
         let (record, advice) = (record.to_owned(), String::new());
         Finding { test, severity, record, channel: None, rows: None, what, numbers: BTreeMap::new(), advice }

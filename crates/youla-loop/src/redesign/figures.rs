@@ -3,7 +3,8 @@
 
 use crate::error::Result;
 use youla::control::{closed_loop, peak_sensitivity, with_input_port};
-use youla::lti::{Discrete, Mode, PeakOptions, SharedMode, StateSpace, hinf_norm};
+use youla::lti::{Discrete, Mode, PeakOptions, SharedMode, StateSpace, frequency_response, hinf_norm};
+use youla::{MatRef, c64};
 
 /// Figures of one loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +44,16 @@ impl LoopFigures {
         let least_damping = least_damping(&modes);
         let peak_response = hinf_norm(&response, &PeakOptions { tolerance: 1e-6 })?.value;
         Ok(LoopFigures { response, modes, least_damping, peak_response, peak_sensitivity })
+    }
+
+    /// Largest gain of the response at angular frequencies.
+    ///
+    /// # Errors
+    /// As [`frequency_response`].
+    pub fn gain(&self, omega: &[f64]) -> Result<Vec<f64>> {
+        let response = frequency_response(&self.response, omega)?;
+        let largest = |g: MatRef<'_, c64>| g.singular_values().map_or(f64::NAN, |s| s.first().copied().unwrap_or(0.0));
+        Ok(response.iter().map(largest).collect())
     }
 }
 

@@ -9,7 +9,7 @@ use youla::{Mat, MatRef};
 /// An observer-based controller: the model and its gains, positive feedback.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
-    /// The model that the observer runs.
+    /// The model that the observer runs, behind the dead time of the machine.
     pub model: StateSpace<Discrete>,
     /// F, m x n.
     pub f: Mat<f64>,
@@ -20,7 +20,7 @@ pub struct Gains {
 /// LQR with weights `1 / size(y)^2` and `weight / size(u)^2`; Kalman predictor with input noise of the size of the inputs and
 /// output noise `output_noise size(y)^2`.
 pub(super) fn design(problem: &RedesignProblem<'_>, weight: f64, output_noise: f64) -> Result<NewController> {
-    let model = problem.model.balanced()?;
+    let model = problem.model.clone().delayed(problem.delay)?.balanced()?;
     let (u, y) = (problem.input_size, problem.output_size);
     let outputs = diagonal(y.iter().map(|s| 1.0 / (s * s)));
     let inputs = diagonal(u.iter().map(|s| weight / (s * s)));
@@ -28,8 +28,13 @@ pub(super) fn design(problem: &RedesignProblem<'_>, weight: f64, output_noise: f
     let disturbance = diagonal(u.iter().map(|s| s * s));
     let noise = diagonal(y.iter().map(|s| output_noise * s * s));
     let l = observer_gain(&model, disturbance.as_ref(), noise.as_ref())?;
-    let system = observer_controller(&model, f.as_ref(), l.as_ref())?;
-    Ok(NewController { system, gains: Some(Gains { model, f, l }), q: None })
+    let computed = observer_controller(&model, f.as_ref(), l.as_ref())?;
+    Ok(NewController {
+        system: computed.clone().delayed(problem.delay)?,
+        computed,
+        gains: Some(Gains { model, f, l }),
+        q: None,
+    })
 }
 
 /// The Kalman predictor of a system with noise of the given covariances at its inputs and outputs.

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use structured::{ControllerStructure, PidOptions};
 use youla::control::{ChannelScales, closed_loop, margins, with_input_port};
 use youla::factor::CoprimeFactors;
-use youla::identify::likelihood::{Interval, Region};
+use youla::identify::likelihood::{Interval, Region, figure};
 use youla::lti::{Discrete, StateSpace};
 use youla::validate::{
     BandCertificate, BandOptions, ExactCertificate, MarginInterval, certify_deviation, certify_region, margin_intervals,
@@ -112,6 +112,8 @@ pub struct RedesignProblem<'a> {
     pub input_size: &'a [f64],
     /// Size of each plant output, its rms.
     pub output_size: &'a [f64],
+    /// Dead time in whole samples that the machine adds to its controller; it is in the factors too.
+    pub delay: usize,
 }
 
 /// One weight that was tried.
@@ -134,8 +136,10 @@ pub struct TriedWeight {
 /// A new controller.
 #[derive(Debug, Clone)]
 pub struct NewController {
-    /// `u = K y` (positive feedback).
+    /// `u = K y` (positive feedback), behind the dead time that the machine adds.
     pub system: StateSpace<Discrete>,
+    /// What the machine computes: `system` without that dead time. The factors of `youla` hold the dead time, and so does its controller.
+    pub computed: StateSpace<Discrete>,
     /// Model and gains of the observer form, for `lqg`.
     pub gains: Option<Gains>,
     /// Q from beta to alpha, for `youla`.
@@ -161,9 +165,18 @@ pub struct Redesign {
     pub band: Option<BandCertificate>,
     /// Figures of the new loop of the plant with their intervals, where the region is known.
     pub intervals: Option<PredictedIntervals>,
+    /// How much better slow loads are rejected: the largest gain from a load at the plant input to y, running over new controller, channels in their
+    /// rms, at [`SLOW`] of the Nyquist frequency.
+    pub rejection: f64,
     /// All weights that were tried, in the order of the options.
     pub candidates: Vec<TriedWeight>,
 }
+
+/// The frequency of slow loads, as a part of the Nyquist frequency. Chosen, not measured.
+pub const SLOW: f64 = 1e-3;
+/// A new controller that rejects slow loads worse than by this factor has lost what the running one was for, as an integral part. Chosen, not
+/// measured.
+const LEAST_REJECTION: f64 = 0.5;
 
 /// What the region of the plant leaves open of the new loop.
 #[derive(Debug, Clone)]
@@ -178,6 +191,14 @@ impl Redesign {
     /// Whether the least damping rises.
     pub fn gains_damping(&self) -> bool {
         self.predicted.least_damping > self.present.least_damping
+    }
+
+    /// Why the new controller should not be taken without a look at slow loads.
+    pub fn reservations(&self) -> Vec<String> {
+        let lost = || {
+            format!("a slow load moves y {} times as far as with the running controller", figure(1.0 / self.rejection))
+        };
+        (self.rejection < LEAST_REJECTION).then(lost).into_iter().collect()
     }
 }
 
@@ -215,7 +236,9 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
                 (Some(region), Some(band)) => Some(predicted_intervals(problem, region, &controller, band.level)?),
                 _ => None,
             };
+            let slow = [SLOW * std::f64::consts::PI / problem.model.time().ts()];
             return Ok(Redesign {
+                rejection: present.gain(&slow)?[0] / predicted.gain(&slow)?[0],
                 method,
                 input_weight,
                 controller,

@@ -29,7 +29,8 @@ pub(super) fn design(
     let noise = diagonal(noise_of_beta(problem, deviation)?.iter().map(|s| output_noise * s * s));
     let l = observer_gain(&seen, disturbance.as_ref(), noise.as_ref())?;
     let q = observer_controller(&seen, f.as_ref(), l.as_ref())?;
-    Ok(NewController { system: problem.factors.controller_of(&q)?, gains: None, q: Some(q) })
+    let system = problem.factors.controller_of(&q)?;
+    Ok(NewController { computed: system.clone(), system, gains: None, q: Some(q) })
 }
 
 /// Weight of alpha against that of u: only so large that the Riccati equation is regular.

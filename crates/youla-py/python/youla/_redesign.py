@@ -99,8 +99,8 @@ def _pid(runs: Sequence[Run], options: Mapping[str, Any]) -> tuple[str, Matrices
         if ran[0] is None or other is None or not _equal(ran[0], other):
             raise InputError(f"run[{k}] had another controller or sample time than run[0]; one controller is redesigned for points at which it ran")
     settings, logs, _ = again(kept[0])
-    trusted = all(run.verdict.trusted for run in runs)
-    return _native.redesign_pid(settings, logs, [k.point() for k in kept], trusted, plain(options))
+    doubts = list(dict.fromkeys(doubt for k in kept for doubt in json.loads(k.summary()).get("doubts", [])))
+    return _native.redesign_pid(settings, logs, [k.point() for k in kept], doubts, plain(options))
 
 
 def _equal(a: Matrices, b: Matrices) -> bool:

@@ -120,7 +120,7 @@ pub(crate) fn exported(records: &RunRecords, redesign: &Redesign) -> ExportedCon
     ExportedController {
         observer: new.gains.as_ref().map(|g| ObserverData::new(&g.model, g.f.as_ref(), g.l.as_ref())),
         q: new.q.as_ref().map(SystemMatrices::new),
-        ..plain(records, redesign.method.key(), &new.system)
+        ..plain(records, redesign.method.key(), &new.computed)
     }
 }
 

@@ -220,10 +220,16 @@ impl Writer<'_> {
         self.outcome("8-redesign/pid.json", self.found.pid.as_ref(), |new| {
             let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
             self.model_with("8-redesign/new_controller", &new.system, (y, u), &())?;
-            let controller = plain(&self.found.records, "pid", &new.system);
+            let controller = plain(&self.found.records, "pid", &new.computed()?);
             self.folder.text("8-redesign/controller.rs", &controller.rust())?;
             self.folder.json("8-redesign/controller.json", &controller)?;
-            self.folder.json("8-redesign/revert.json", &plain(&self.found.records, "running", &new.running))?;
+            let ran = &self.found.settings.controller;
+            let running = match ran.delay() {
+                0 => new.running.clone(),
+                // A controller with `delay` needs neither a nominal model nor a file.
+                _ => ran.without_delay().realise(new.running.time(), None, std::path::Path::new("."))?.system().clone(),
+            };
+            self.folder.json("8-redesign/revert.json", &plain(&self.found.records, "running", &running))?;
             let (figure, steps) = (pid::figure(new), pid::steps());
             self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &steps))?;
             self.folder.text("8-redesign/response.svg", &svg(&figure, &steps)?)?;

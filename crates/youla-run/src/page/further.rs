@@ -10,7 +10,7 @@ use youla_report::data::{LineStatus, ReportPart, Verdict};
 pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
     let of_loop = loops::lines(found, summary).into_iter().filter(|line| !loops::warns(line));
     let lines = [
-        found.new_controller().map(redesign::line),
+        found.new_controller().map(|new| redesign::line(new, found.redesign_reservation())),
         found.new_pid().map(pid::line),
         found.reduced().map(reduction::line),
         grey_box_line(found),

@@ -3,7 +3,8 @@
 use super::decibels::decibel;
 use crate::{Error, Result};
 use std::f64::consts::TAU;
-use youla::lti::{SharedMode, frequency_response};
+use youla::identify::likelihood::figure as digits;
+use youla::lti::SharedMode;
 use youla_loop::redesign::{LoopFigures, Redesign, TriedWeight};
 use youla_report::data::{self, DrawnMethod, EvidenceTable, LineStatus, MethodRole, ReportPart, Verdict};
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
@@ -14,9 +15,11 @@ pub(super) fn drawn(redesign: &Redesign) -> Result<data::DrawnRedesign> {
 }
 
 /// What the new controller promises.
-pub(super) fn line(redesign: &Redesign) -> Verdict {
-    let status = if redesign.gains_damping() { LineStatus::Good } else { LineStatus::Caution };
-    Verdict { status, text: sentence(redesign), evidence: ReportPart::Redesign }
+pub(super) fn line(redesign: &Redesign, reservation: Option<String>) -> Verdict {
+    let good = redesign.gains_damping() && reservation.is_none();
+    let status = if good { LineStatus::Good } else { LineStatus::Caution };
+    let kept = reservation.map_or_else(String::new, |why| format!(" Do not take it as it is: {why}."));
+    Verdict { status, text: sentence(redesign) + &kept, evidence: ReportPart::Redesign }
 }
 
 fn sentence(redesign: &Redesign) -> String {
@@ -34,12 +37,13 @@ fn sentence(redesign: &Redesign) -> String {
     let verb = if redesign.gains_damping() { "raises" } else { "lowers" };
     format!(
         "The new controller {verb} the minimum damping of the loop from {:.3} to {:.3}{interval}. The peak response to a disturbance at the \
-         plant input is {:.2} (present controller: {:.2}) and the peak sensitivity {:.2} (present: {:.2}){band}. These are \
-         predictions: the controller has not run yet.",
+         plant input is {:.2} (present controller: {:.2}), that to a slow load {} times as large as now, and the peak sensitivity {:.2} \
+         (present: {:.2}){band}. These are predictions: the controller has not run yet.",
         present.least_damping,
         predicted.least_damping,
         predicted.peak_response,
         present.peak_response,
+        digits(1.0 / redesign.rejection),
         predicted.peak_sensitivity,
         present.peak_sensitivity
     )
@@ -99,9 +103,7 @@ pub(crate) fn figure(redesign: &Redesign) -> Result<Figure> {
         (0..POINTS).map(|k| nyquist * 10f64.powf(-2.5 * (1.0 - (k + 1) as f64 / POINTS as f64))).collect();
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let curve = |method: &DrawnMethod, figures: &LoopFigures| {
-        let response = frequency_response(&figures.response, &omega)?;
-        let gain = response.iter().map(|g| g.singular_values().map_or(f64::NAN, |s| s.first().copied().unwrap_or(0.0)));
-        let y = gain.map(decibel).collect();
+        let y = figures.gain(&omega)?.into_iter().map(decibel).collect();
         Ok::<_, Error>(Curve { method: method.key.clone(), x: hz.clone(), y, ..Curve::default() })
     };
     let [present, new] = loops();

@@ -10,9 +10,8 @@ use crate::Result;
 use faer::Scale;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use youla::Mat;
 use youla::control::RunningController;
-use youla::linalg::{check_shape, eye};
+use youla::linalg::check_shape;
 use youla::lti::{Continuous, Discrete, StateSpace};
 
 /// How a controller in s was brought to the sample time.
@@ -162,14 +161,25 @@ impl ControllerSettings {
 
     /// Dead time in whole samples that is stated beside the controller.
     pub(crate) fn delay(&self) -> usize {
+        self.clone().stated_delay().map_or(0, |delay| *delay)
+    }
+
+    /// What the machine computes: the controller without that dead time.
+    pub(crate) fn without_delay(&self) -> Self {
+        let mut computed = self.clone();
+        computed.stated_delay().into_iter().for_each(|delay| *delay = 0);
+        computed
+    }
+
+    fn stated_delay(&mut self) -> Option<&mut usize> {
         match self {
             Self::DifferenceEquation { delay, .. }
             | Self::TransferFunction { delay, .. }
-            | Self::StateSpace { delay, .. } => *delay,
-            Self::Pid(pid) => pid.delay,
-            Self::IdealPid(pid) => pid.delay,
-            Self::Cascade(cascade) => cascade.delay,
-            Self::ModelFile { .. } | Self::Observer { .. } => 0,
+            | Self::StateSpace { delay, .. } => Some(delay),
+            Self::Pid(pid) => Some(&mut pid.delay),
+            Self::IdealPid(pid) => Some(&mut pid.delay),
+            Self::Cascade(cascade) => Some(&mut cascade.delay),
+            Self::ModelFile { .. } | Self::Observer { .. } => None,
         }
     }
 
@@ -314,12 +324,9 @@ const LONGEST: usize = 1000;
 
 /// `z^-delay K`, with m states for each sample.
 fn delayed(system: StateSpace<Discrete>, delay: usize) -> Result<StateSpace<Discrete>> {
-    let m = system.outputs();
-    let one = StateSpace::new(Mat::zeros(m, m), eye(m), eye(m), Mat::zeros(m, m), system.time())?;
     if delay > LONGEST {
         let what = "[controller] delay".into();
         return Err(youla::Error::OutOfRange { what, value: delay as f64, must: "at most 1000 samples" }.into());
     }
-    let chain = (0..delay).try_fold(system, |k, _| k.then(&one));
-    Ok(chain?)
+    Ok(system.delayed(delay)?)
 }

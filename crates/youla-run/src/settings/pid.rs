@@ -109,6 +109,18 @@ impl ParallelPid {
 }
 
 impl IdealPid {
+    /// The same in parallel form.
+    pub(super) fn parallel(&self) -> ParallelPid {
+        let Self { feedback, discretisation, delay, .. } = *self;
+        let each = self.parts().0.unwrap_or_default();
+        let gain = |of: fn(&Pid) -> f64| match &each[..] {
+            [one] => LoopGain::One(of(one)),
+            each => LoopGain::Each(each.iter().map(of).collect()),
+        };
+        let (kp, ki, kd) = (gain(|p| p.kp), gain(|p| p.ki), gain(|p| p.kd));
+        ParallelPid { feedback, discretisation, kp, ki, kd, derivative_filter: gain(|p| p.filter), delay }
+    }
+
     pub(super) fn parts(&self) -> PidLoops {
         let Self { discretisation, kp, ti, td, derivative_filter: filter, .. } = self;
         let never = LoopGain::One(f64::INFINITY);

@@ -50,7 +50,12 @@ impl ControllerSettings {
 
     /// The parts of a PID with a gain of one each, positive feedback.
     pub(crate) fn gain_parts(&self, time: Discrete, folder: &Path) -> Vec<GainPart> {
-        let Self::Pid(pid) = self else { return Vec::new() };
+        // A wrong kp of the ideal form is a factor on the whole.
+        let (pid, keys, first) = match self {
+            Self::Pid(pid) => (pid.clone(), ["kp", "ki", "kd"], 0),
+            Self::IdealPid(pid) => (pid.parallel(), ["", "ti", "td"], 1),
+            _ => return Vec::new(),
+        };
         let loops = pid.loops();
         let of = |(gain, place): (usize, usize)| {
             let unit = |k: usize| {
@@ -58,12 +63,14 @@ impl ControllerSettings {
                 loops.map_or(LoopGain::One(f64::from(u8::from(k == gain))), |loops| LoopGain::Each(of(loops)))
             };
             let part = Self::Pid(ParallelPid { kp: unit(0), ki: unit(1), kd: unit(2), ..pid.clone() });
-            let (key, value) = [("kp", &pid.kp), ("ki", &pid.ki), ("kd", &pid.kd)][gain];
+            let (key, value) = (keys[gain], [&pid.kp, &pid.ki, &pid.kd][gain]);
             let key = if loops.is_some() { format!("{key} of loop {}", place + 1) } else { key.to_owned() };
             let controller = part.realise(time, None, folder).ok()?.system().clone();
-            Some(GainPart { key, value: value.of(place), controller })
+            let kp = pid.kp.of(place);
+            let stated = [(1.0, 1), (kp, -1), (1.0 / kp, 1)][if first == 0 { 0 } else { gain }];
+            Some(GainPart { key, value: value.of(place), stated, controller })
         };
-        (0..3).flat_map(|gain| (0..loops.unwrap_or(1)).map(move |place| (gain, place))).filter_map(of).collect()
+        (first..3).flat_map(|gain| (0..loops.unwrap_or(1)).map(move |place| (gain, place))).filter_map(of).collect()
     }
 
     /// Whether it is stated with times or in s.
@@ -175,5 +182,26 @@ fn reversed(polynomials: &Polynomials) -> Polynomials {
     match polynomials {
         Polynomials::Single(c) => Polynomials::Single(turned(c)),
         Polynomials::Matrix(m) => Polynomials::Matrix(m.iter().map(|row| row.iter().map(turned).collect()).collect()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_of_the_ideal_form_are_gains_of_the_parallel_one() {
+        let text =
+            "[ideal_pid]\nfeedback = \"negative\"\ndiscretisation = \"backward-euler\"\nkp = 2.0\nti = 0.5\ntd = 0.1";
+        let ideal: ControllerSettings = toml::from_str(text).unwrap();
+        let (time, folder) = (Discrete::new(0.01).unwrap(), Path::new("."));
+        let parts = ideal.gain_parts(time, folder);
+        let stated: Vec<(&str, f64)> = parts.iter().map(|p| (p.key.as_str(), p.value)).collect();
+        assert_eq!(stated, [("ti", 4.0), ("td", 0.2)]);
+        assert_eq!(parts.iter().map(|p| p.stated).collect::<Vec<_>>(), [(2.0, -1), (0.5, 1)]);
+        // One sample of error, u = -(kp + ki ts + kd / ts): the parts are those of the whole.
+        let whole = ideal.realise(time, None, folder).unwrap().system().d()[(0, 0)];
+        let of_parts: f64 = parts.iter().map(|p| p.value * p.controller.d()[(0, 0)]).sum();
+        assert!((whole - (of_parts - 2.0)).abs() < 1e-12, "{whole} {of_parts}");
     }
 }

@@ -39,10 +39,10 @@ pub fn redesign_kept(
     let declared = declared_loop(settings, records, Path::new("."))?;
     let base = declared.nominal.as_ref().unwrap_or(plant);
     let factors = factorise((base, &declared.running), records.sizes(), &settings.factors)?.factors;
-    design(records, (plant, model), &factors, region, options)
+    design(records, (plant, model), (&factors, settings.controller.delay()), region, options)
 }
 
-/// One PID for the plants and regions of runs that were kept, `trusted` where all their models are, as `[redesign] structure = "pid"` with these options gives it for one; settings
+/// One PID for the plants and regions of runs that were kept, with what speaks against any of them, as `[redesign] structure = "pid"` with these options gives it for one; settings
 /// and records are those of the first run, whose controller ran at all points.
 ///
 /// # Errors
@@ -51,11 +51,11 @@ pub fn pid_kept(
     settings: &RunSettings,
     records: &RunRecords,
     points: Vec<(&StateSpace<Discrete>, &Region)>,
-    trusted: bool,
+    doubts: Vec<String>,
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let declared = declared_loop(settings, records, Path::new("."))?;
-    pid_of(RunContext { settings, records, declared: &declared, factorisation: None }, points, trusted, options)
+    pid_of(RunContext { settings, records, declared: &declared, factorisation: None }, points, doubts, options)
 }
 
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.

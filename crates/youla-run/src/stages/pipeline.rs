@@ -16,7 +16,7 @@ use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
 use crate::stages::recommend::{defects, is_of_outliers, recommend, weigh};
-use crate::stages::redesign::{pid, redesigned};
+use crate::stages::redesign::{doubts, pid, redesigned};
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
 use crate::stages::signals::deviation_signals;
@@ -127,7 +127,7 @@ pub fn identify(
     let certificate = clock
         .run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?, margins)));
     let (redesign, pid) = clock.run(Stage::Redesign, || match recommended.as_ref() {
-        Ok(model) => match pid(run, model) {
+        Ok(model) => match pid(run, model, doubts(Some(model), &data)) {
             None => (redesigned(run, model, found(reduction.as_ref())), None),
             new => (None, new),
         },

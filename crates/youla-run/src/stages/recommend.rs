@@ -10,14 +10,17 @@ use youla::identify::{Identified, identify, identify_response};
 use youla::signal::LoopRecord;
 use youla_loop::check::{CheckOptions, Finding, Severity, Test, output_outliers};
 
-/// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
-/// outliers have tests and consequences of their own.
+/// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model, and a stated controller beside
+/// which the log names another one supports no margin. Otherwise the controller and single outliers have tests and consequences of their own.
 pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
-    let of_data = |f: &&Finding| f.severity == Severity::Defect && f.record != OF_SETTINGS && !OWN.contains(&f.test);
+    let of_data = |f: &&Finding| {
+        let severe = f.severity == Severity::Defect && f.record != OF_SETTINGS;
+        severe && !OWN.contains(&f.test) || f.severity > Severity::Note && f.shows_another_controller()
+    };
     let found: Vec<&Finding> = data.findings.iter().filter(of_data).collect();
     let first = found.first()?;
     let question = "Defects that the check of the data found";
-    Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}", first.record, first.what)))
+    Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}. {}", first.record, first.what, first.advice)))
 }
 
 /// Tests of the data with a test or a consequence of their own in the verdict.

@@ -63,6 +63,9 @@ pub struct Summary {
     pub channel_scales: OrRefused<ScalesEntry>,
     /// The loop of G(S); `null` where the scheme gave none.
     pub certificate: Option<CertificateEntry>,
+    /// What speaks against a new controller that is designed on this run, a sentence each.
+    #[serde(default)]
+    pub doubts: Vec<String>,
     /// The new controller, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<RedesignEntry>,
@@ -98,6 +101,7 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         true_plant,
         channel_scales: robustness::scales(run),
         certificate: run.certified().map(CertificateEntry::from),
+        doubts: run.doubts(),
         redesign: run.new_controller().map(RedesignEntry::from),
         pid: run.new_pid().map(PidEntry::from),
         reduction: run.reduced().map(ReductionEntry::from),

@@ -30,6 +30,13 @@ pub struct RedesignEntry {
     /// Margins of the new loop on the plant with their intervals, by name.
     #[serde(default)]
     pub margins: BTreeMap<String, IntervalEntry>,
+    /// How much better slow loads are rejected than by the running controller: the largest gain from a load at the plant input to y, running over
+    /// new controller, at a thousandth of the Nyquist frequency.
+    #[serde(default)]
+    pub rejection: Option<f64>,
+    /// Why it should not be taken without a look at slow loads.
+    #[serde(default)]
+    pub reservations: Vec<String>,
     /// The exact test of the plant with K(Q), for `youla`.
     pub exact: Option<ExactEntry>,
     /// All weights that were tried.
@@ -85,6 +92,8 @@ impl From<&Redesign> for RedesignEntry {
                 .as_ref()
                 .and_then(|i| Some(IntervalEntry::from(i.least_damping.as_ref()?))),
             margins: redesign.intervals.as_ref().map_or_else(BTreeMap::new, |i| margins(&i.margins)),
+            rejection: finite(redesign.rejection),
+            reservations: redesign.reservations(),
             exact: redesign.exact.as_ref().map(exact),
             candidates: redesign.candidates.clone(),
         }

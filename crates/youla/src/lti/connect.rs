@@ -1,10 +1,22 @@
 //! Interconnection: series, parallel, stacking, inversion and the closing of internal loops, all in state space.
 
-use super::{StateSpace, TimeDomain};
+use super::{Discrete, StateSpace, TimeDomain};
 use crate::linalg::{block, block_diagonal, eye, solve, solve_in_any_units, solve_right};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use std::ops::Range;
+
+impl StateSpace<Discrete> {
+    /// `z^-samples` times this system: its outputs later by whole samples, with a state of each for every one.
+    ///
+    /// # Errors
+    /// Those of [`StateSpace::new`].
+    pub fn delayed(self, samples: usize) -> Result<Self> {
+        let p = self.outputs();
+        let one = Self::new(Mat::zeros(p, p), eye(p), eye(p), Mat::zeros(p, p), self.time())?;
+        (0..samples).try_fold(self, |chain, _| chain.then(&one))
+    }
+}
 
 impl<T: TimeDomain> StateSpace<T> {
     /// `next * self`: the output of this system drives `next`. States are those of this system, then of `next`.

@@ -84,7 +84,8 @@ pub(super) fn gains(log: &Log<'_>, k: &StateSpace<Discrete>, parts: &[GainPart])
     }
     for part in parts {
         let (more, left) = factor(&beside.response(&part.controller, log.e.as_ref())?, &(&w - &law));
-        all.push((Change::Part(part.key.clone(), part.value + more), left / total));
+        let (factor, power) = part.stated;
+        all.push((Change::Part(part.key.clone(), factor * (part.value + more).powi(power)), left / total));
     }
     Ok(all)
 }
@@ -138,6 +139,7 @@ mod tests {
         let part = |key: &str, value: f64, gains: [f64; 2]| GainPart {
             key: key.into(),
             value,
+            stated: (1.0, 1),
             controller: pi(gains[0], gains[1]),
         };
         let parts = [part("kp", stated[0], [1.0, 0.0]), part("ki", stated[1], [0.0, 1.0])];

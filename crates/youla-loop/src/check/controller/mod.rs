@@ -87,6 +87,8 @@ pub struct GainPart {
     pub key: String,
     /// Its stated value.
     pub value: f64,
+    /// Factor and power of the gain in what the key states: 1 and 1 but for times, `ti = kp ki^-1` and `td = kd / kp`.
+    pub stated: (f64, i32),
     /// The part with a gain of one, positive feedback.
     pub controller: StateSpace<Discrete>,
 }

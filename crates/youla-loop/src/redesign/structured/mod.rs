@@ -59,8 +59,8 @@ pub struct PidProblem<'a> {
     pub delay: usize,
     /// From the references to u, where that is another path than that of the error.
     pub reference: Option<StateSpace<Discrete>>,
-    /// Whether the verdict trusts every model.
-    pub trusted: bool,
+    /// What speaks against the models or the stated controller, a sentence each.
+    pub doubts: Vec<String>,
 }
 
 /// A PID, or one for each loop, with its proof.
@@ -84,18 +84,15 @@ pub struct PidRedesign {
     pub reference_weights: Option<Vec<ReferenceWeights>>,
     /// The way to the new controller.
     pub steps: Vec<PlannedStep>,
-    /// Whether the verdict trusts the models on which all this rests.
-    pub trusted: bool,
+    /// What speaks against the models or the stated controller on which all this rests.
+    pub doubts: Vec<String>,
 }
 
 impl PidRedesign {
     /// Why the new controller should not be taken; empty where it keeps what it promises.
     pub fn reservations(&self) -> Vec<String> {
         let p = &self.proof;
-        let mut reasons = Vec::new();
-        if !self.trusted {
-            reasons.push("the model is not trusted, and what is proved on its region may not hold".to_owned());
-        }
+        let mut reasons = self.doubts.clone();
         if let Some(reason) = super::contradicted(p.impossible, p.models) {
             reasons.push(reason);
         } else if !p.holds() {
@@ -113,6 +110,15 @@ impl PidRedesign {
         reasons
     }
 
+    /// What the machine computes: `system` without the dead time that the machine adds.
+    ///
+    /// # Errors
+    /// Those of [`PidController::system`].
+    pub fn computed(&self) -> Result<StateSpace<Discrete>> {
+        let without = |c: &PidController| PidController { delay: 0, ..c.clone() };
+        Ok(whole(&self.controllers.iter().map(without).collect::<Vec<_>>(), self.system.time())?)
+    }
+
     /// That of the loop in which slow loads gain least.
     pub fn rejection(&self) -> f64 {
         self.rejections.iter().copied().fold(f64::INFINITY, f64::min)
@@ -127,7 +133,7 @@ impl PidRedesign {
 /// [`youla::Error::NotStabilising`] where the running controller does not stabilise the plant.
 pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
     options.check()?;
-    let PidProblem { points, running, delay, reference, trusted } = problem;
+    let PidProblem { points, running, delay, reference, doubts } = problem;
     let (running, delay) = (*running, *delay);
     if let Some((what, instead)) = unsupported(problem)? {
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
@@ -186,7 +192,7 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         options: options.clone(),
         controllers,
         system,
-        trusted: *trusted,
+        doubts: doubts.clone(),
     })
 }
 

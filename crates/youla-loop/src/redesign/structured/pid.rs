@@ -145,8 +145,7 @@ impl PidController {
             let [numerator, denominator] = notch.coefficients(time.ts()).map(|c| vec![vec![c.to_vec()]]);
             chain = chain.then(&StateSpace::difference_equation(&numerator, &denominator, time)?)?;
         }
-        let one = StateSpace::difference_equation(&vec![vec![vec![0.0, 1.0]]], &vec![vec![vec![1.0]]], time)?;
-        (0..self.delay).try_fold(chain, |k, _| k.then(&one))
+        chain.delayed(self.delay)
     }
 
     /// Numerator and monic denominator at `q = z^-1`, C being their quotient; that of a part that is not there is 1.

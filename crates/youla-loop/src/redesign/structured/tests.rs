@@ -190,7 +190,7 @@ fn of_model<'a>(
     model: &'a youla::identify::likelihood::Recommendation,
     running: &'a StateSpace<Discrete>,
 ) -> PidProblem<'a> {
-    PidProblem { points: vec![(&model.plant, &model.region)], running, delay: 0, reference: None, trusted: true }
+    PidProblem { points: vec![(&model.plant, &model.region)], running, delay: 0, reference: None, doubts: Vec::new() }
 }
 
 /// The seeded promise: designed on a model, the limits hold on the machine itself, and the proof on fresh draws holds. The same on one thread
@@ -265,7 +265,7 @@ fn one_controller_serves_several_operating_points() {
     let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let of = |points| {
-        design_pid(&PidProblem { points, running: &k, delay: 0, reference: None, trusted: true }, &options, &band)
+        design_pid(&PidProblem { points, running: &k, delay: 0, reference: None, doubts: Vec::new() }, &options, &band)
             .unwrap()
     };
     let new = of(both);

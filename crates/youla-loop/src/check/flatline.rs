@@ -33,6 +33,12 @@ const CHANCE: f64 = 1e-4;
 /// Repeats of 2 and 3 samples are frequent in coarsely quantised records. Chosen, not measured.
 const SHORTEST: usize = 4;
 
+/// A channel with so many other constant stretches, no more likely by chance, of more than this part of the longest rests: it is not stuck. A
+/// heater of 33 steps at a set point rested for 1746 samples, and for 188 to 565 five times.
+const RESTS: usize = 4;
+/// One over that part.
+const A_REST: usize = 10;
+
 /// Length up to which a constant start of a channel is the rest before the excitation has come through the dead time.
 /// Chosen, not measured.
 const AT_REST: usize = 100;
@@ -48,23 +54,18 @@ const AT_REST: usize = 100;
 /// assert_eq!((found.first, found.samples), (200, 30));
 /// ```
 pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
-    let (mut longest, mut next) = ((0usize, 0usize), 0usize);
-    let (mut first, mut repeated) = (0usize, 0usize);
-    for k in 1..=values.len() {
-        if k < values.len() && values[k] == values[k - 1] {
-            repeated += 1;
-            continue;
+    // Lengths and first samples, the longest first.
+    let mut longest = [(0, 0); RESTS + 1];
+    let (mut first, mut repeated) = (0, 0);
+    for stretch in values.chunk_by(|a, b| a == b) {
+        repeated += stretch.len() - 1;
+        if stretch.len() > longest[RESTS].0 {
+            longest[RESTS] = (stretch.len(), first);
+            longest.sort_by_key(|(samples, _)| std::cmp::Reverse(*samples));
         }
-        let length = k - first;
-        if length > longest.1 {
-            next = longest.1;
-            longest = (first, length);
-        } else {
-            next = next.max(length);
-        }
-        first = k;
+        first += stretch.len();
     }
-    let (first, samples) = longest;
+    let [(samples, first), (next, _), ..] = longest;
     // Before it first moves a machine is at rest.
     let rests = first == 0 && samples < AT_REST;
     if rests || samples < SHORTEST || samples == values.len() || samples as f64 <= options.stuck_ratio * next as f64 {
@@ -73,8 +74,11 @@ pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
     // The stretch itself does not count in what is usual.
     let others = (values.len() - samples) as f64;
     let share = (repeated + 1 - samples) as f64 / others;
-    let chance = others * share.powf(samples as f64 - 1.0);
-    (chance < CHANCE && several(values, options.switched_levels)).then_some(Standstill {
+    let by_chance = |samples: usize| others * share.powf(samples as f64 - 1.0) >= CHANCE;
+    // An actuator of few steps rests at set points for long, now and then.
+    let rest = longest[RESTS].0;
+    let rests = rest * A_REST > samples && !by_chance(rest);
+    (!by_chance(samples) && !rests && several(values, options.switched_levels)).then_some(Standstill {
         first,
         samples,
         value: values[first],
@@ -158,6 +162,23 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
+
+    /// A heater of 32 steps that rests at set points, and the same stuck once for as long as the longest.
+    #[test]
+    fn an_actuator_of_few_steps_rests() {
+        let rests = |rests: &[usize]| {
+            let mut level = 0;
+            let steps = (0..3000).map(|k| ((k * 7) % 32, 1 + k % 3)).chain(rests.iter().map(|rest| (33, *rest)));
+            let of = |(step, samples): (i32, usize)| {
+                level = 1 - level;
+                vec![f64::from(step + level); samples]
+            };
+            steps.flat_map(of).collect::<Vec<f64>>()
+        };
+        let options = CheckOptions::default();
+        assert_eq!(stuck(&rests(&[188, 228, 282, 350, 565, 1746]), &options), None);
+        assert_eq!(stuck(&rests(&[1746]), &options).unwrap().samples, 1746);
+    }
 
     /// Noise in steps of twice its deviation repeats itself often; nothing in 200 records, and 40 equal samples in each.
     #[test]

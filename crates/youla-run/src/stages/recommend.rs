@@ -20,7 +20,10 @@ pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
     let found: Vec<&Finding> = data.findings.iter().filter(of_data).collect();
     let first = found.first()?;
     let question = "Defects that the check of the data found";
-    Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}. {}", first.record, first.what, first.advice)))
+    Some(
+        Evidence::new(question, found.len() as f64, 0.0)
+            .noted(format!("{}: {}. {}", first.record, first.what, first.advice)),
+    )
 }
 
 /// Tests of the data with a test or a consequence of their own in the verdict.

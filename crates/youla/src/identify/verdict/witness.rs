@@ -7,9 +7,11 @@ use super::local_error::{Channels, LocalErrors, RecordLines, explained_inputs, h
 use super::partition::Partition;
 use crate::identify::likelihood::LoopSignals;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
-use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, lines_of, long_enough};
+use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::with_best_ends;
 use crate::identify::subspace::Experiment;
+use crate::linalg::TINY;
 use faer::{Mat, MatRef, c64};
 
 /// Records that are a group each, at most; more are joined.
@@ -19,6 +21,8 @@ const MOST_GROUPS: usize = 6;
 struct Group {
     /// Of each record.
     records: Vec<[Vec<c64>; 3]>,
+    /// Of each record and line, what whitens the noise of the model, over its mean over the record.
+    whitening: Vec<Vec<f64>>,
 }
 
 /// The error of the model as the excitation shows it.
@@ -51,20 +55,44 @@ impl Group {
         }
         let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
         let residuals = point.residuals(&spectra);
+        let whitening = spectra.records.iter().map(|lines| whitening(&found.noise, lines)).collect();
         let all = spectra.records.into_iter().zip(residuals).zip(records);
         let records = all.map(|((lines, v), (_, x))| [lines.u, v, lines_of(*x, problem.skip)]).collect();
-        Some(Group { records })
+        Some(Group { records, whitening })
     }
 
-    /// Under a Hann window.
+    /// Under a Hann window, each line times what whitens the noise: of a band in which the noise falls by decades, as below a slow load and an
+    /// integrator, the strongest lines would decide alone, and their noise would be taken for that of all.
     fn windowed(self, Channels { m, p, q }: Channels) -> Self {
-        let of = |[u, v, x]: [Vec<c64>; 3]| [hann(&u, m), hann(&v, p), hann(&x, q)];
-        Group { records: self.records.into_iter().map(of).collect() }
+        let of = |([u, v, x], by): ([Vec<c64>; 3], &Vec<f64>)| {
+            let white = |lines: Vec<c64>, channels: usize| {
+                let mut lines = hann(&lines, channels);
+                lines.chunks_mut(channels).zip(by).for_each(|(line, by)| line.iter_mut().for_each(|v| *v *= *by));
+                lines
+            };
+            [white(u, m), white(v, p), white(x, q)]
+        };
+        let records = self.records.into_iter().zip(&self.whitening).map(of).collect();
+        Group { records, ..self }
     }
 
     fn lines(&self) -> impl Iterator<Item = RecordLines<'_>> {
         self.records.iter().map(|[u, v, x]| RecordLines { u, v, x })
     }
+}
+
+/// One over the root of the power of the noise on each line, over the mean of all; of several outputs the root of the mean over them of one over
+/// their powers.
+fn whitening(noise: &Noise, lines: &Lines) -> Vec<f64> {
+    let p = noise.regression.len();
+    let of_outputs = noise.of_each_output(lines);
+    let of_line = |(values, weight): (&[c64], &f64)| {
+        (values.iter().map(c64::norm_sqr).sum::<f64>() / p as f64).sqrt() / weight.max(TINY)
+    };
+    let mut out: Vec<f64> = of_outputs.chunks(p).zip(&lines.weight).map(of_line).collect();
+    let mean = out.iter().sum::<f64>() / out.len().max(1) as f64;
+    out.iter_mut().for_each(|v| *v /= mean.max(TINY));
+    out
 }
 
 impl Witness {

@@ -137,3 +137,51 @@ fn a_command_logged_before_its_limit_is_judged_by_what_the_limit_takes() {
     let test = outcome(&one_of_four, "(nonlinearity)");
     assert!(test.outcome == TestOutcome::Failed && test.note.contains("in record 2 of 4"), "{test}");
 }
+
+/// A press: steps of the reference every few seconds beside a binary excitation, a load that changes slowly on a plant that integrates. The lowest
+/// lines hold most of the reference and of the load; whose power there is not that of the lines above them.
+#[test]
+fn a_slow_load_below_few_steps_of_the_reference_is_no_variation() {
+    let held = |den: [f64; 2], gain: f64| {
+        StateSpace::difference_equation(&vec![vec![vec![0.0, gain]]], &vec![vec![den.to_vec()]], time()).unwrap()
+    };
+    let press = held([1.0, -0.9993], 8.4e-3).then(&held([1.0, -0.8], 0.2)).unwrap();
+    let pi = StateSpace::difference_equation(&vec![vec![vec![-4.0, 3.988]]], &vec![vec![vec![1.0, -1.0]]], time());
+    let pi = pi.unwrap();
+    let rig = closed_loop(&press, &with_input_port(&pi).unwrap()).unwrap();
+    let trusted = |seed: u64| {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let (mut load, mut level, mut reference) = (0.0, 0.0, 0.0);
+        let mut record = |rows: usize| {
+            let of = |k: usize| {
+                if k % 800 == 0 {
+                    level = 15.0 * rng.random_range(-1.0..1.0);
+                }
+                reference += 0.02 * (level - reference);
+                load = 0.995 * load + 0.08 * rng.sample::<f64, _>(StandardNormal);
+                let excitation = if (k / 6) % 2 == usize::from(rng.random_bool(0.5)) { 3.0 } else { -3.0 };
+                [excitation, load, reference, 0.01 * rng.sample::<f64, _>(StandardNormal)]
+            };
+            let rows: Vec<[f64; 4]> = (0..rows).map(of).collect();
+            let column = |of: &dyn Fn(&[f64; 4]) -> f64| Mat::from_fn(rows.len(), 1, |k, _| of(&rows[k]));
+            let (at_input, at_output) = (column(&|r| r[0] + r[1]), column(&|r| r[3] - r[2]));
+            let log =
+                simulate(&rig, block(&[&[at_input.as_ref(), at_output.as_ref()]]).as_ref(), &vec![0.0; rig.order()]);
+            let log = log.unwrap();
+            // Behind y - r is the loop: the load is in the applied input and not in the command.
+            let u = log.subcols(0, 1) - column(&|r| r[1]);
+            let y = log.subcols(1, 1) + column(&|r| r[2]);
+            let record = LoopRecord::new(time(), u, y).unwrap();
+            record.with_input_excitation(column(&|r| r[0])).unwrap().with_reference(column(&|r| r[2])).unwrap()
+        };
+        let (estimation, fresh) = (record(16_000), record(8_000));
+        let found =
+            identify(&[estimation], &[fresh], &RunningController::new(pi.clone()), None, &LikelihoodOptions::default());
+        let found = found.unwrap();
+        (found.trusted(), outcome(&found, "(region)").figure)
+    };
+    for seed in 1..=3 {
+        let (trusted, figure) = trusted(seed);
+        assert!(trusted && figure < 0.1, "seed {seed}: {figure}");
+    }
+}

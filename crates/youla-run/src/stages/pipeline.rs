@@ -15,7 +15,7 @@ use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
-use crate::stages::recommend::{defects, is_of_outliers, recommend, weigh};
+use crate::stages::recommend::{defects, is_of_outliers, named_controllers, recommend, weigh};
 use crate::stages::redesign::{doubts, pid, redesigned};
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
@@ -67,6 +67,7 @@ pub fn identify(
     let (s, grey_box) = s;
     let (mut recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
     if let Ok(model) = &mut recommended {
+        model.evidence.extend(named_controllers(&data, model));
         model.evidence.extend(defects(&data));
         weigh(&mut data, model);
     }

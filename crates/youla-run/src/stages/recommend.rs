@@ -10,20 +10,26 @@ use youla::identify::{Identified, identify, identify_response};
 use youla::signal::LoopRecord;
 use youla_loop::check::{CheckOptions, Finding, Severity, Test, output_outliers};
 
-/// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model, and a stated controller beside
-/// which the log names another one supports no margin. Otherwise the controller and single outliers have tests and consequences of their own.
+/// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
+/// outliers have tests and consequences of their own.
 pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
-    let of_data = |f: &&Finding| {
-        let severe = f.severity == Severity::Defect && f.record != OF_SETTINGS;
-        severe && !OWN.contains(&f.test) || f.severity > Severity::Note && f.shows_another_controller()
-    };
-    let found: Vec<&Finding> = data.findings.iter().filter(of_data).collect();
+    let of_data = |f: &&Finding| f.severity == Severity::Defect && f.record != OF_SETTINGS && !OWN.contains(&f.test);
+    refuted("Defects that the check of the data found", data.findings.iter().filter(of_data).collect())
+}
+
+/// The same of a stated controller beside which the log names another one: margins, certificate and redesign rest on it, also where it does
+/// little to this loop, as that of outputs in a unit in which the loop gain is near zero.
+pub(crate) fn named_controllers(data: &DataCheck, model: &Recommendation) -> Option<Evidence> {
+    let another = |f: &&Finding| f.severity > Severity::Note && f.shows_another_controller();
+    let found = data.findings.iter().filter(another).collect();
+    refuted("Records that name another controller than the stated one (controller)", found)
+        .filter(|_| model.description() != Some(false))
+}
+
+fn refuted(question: &str, found: Vec<&Finding>) -> Option<Evidence> {
     let first = found.first()?;
-    let question = "Defects that the check of the data found";
-    Some(
-        Evidence::new(question, found.len() as f64, 0.0)
-            .noted(format!("{}: {}. {}", first.record, first.what, first.advice)),
-    )
+    let end = if first.advice.is_empty() { String::new() } else { format!(". {}", first.advice) };
+    Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}{end}", first.record, first.what)))
 }
 
 /// Tests of the data with a test or a consequence of their own in the verdict.

@@ -54,7 +54,11 @@ impl Change {
             Change::ReferenceGain(i, gain) => format!("{} times the reference of {}{}", few(*gain), name(*i), unit(*gain)),
             Change::InputGain(i, gain) => format!("{} times {}{}", few(*gain), input(*i), unit(*gain)),
             Change::ExcitationGain(i, gain) => format!("{} times the excitation of {}{}", few(*gain), input(*i), unit(*gain)),
-            Change::Part(key, value) => format!("{key} = {} in [controller]", few(*value)),
+            Change::Part(key, value) => {
+                // Of a PI a log shows ki times the sample time.
+                let clock = if ["ki", "ti"].contains(&key.as_str()) { " (or, of a PI, `sample_time` by the same factor)" } else { "" };
+                format!("{key} = {} in [controller]{clock}", few(*value))
+            }
             Change::Exchanged(i, j) => format!("{} and {} exchanged", name(*i), name(*j)),
             Change::Saturation([low, high]) => format!("the input limited to {} ... {}", few(*low), few(*high)),
             Change::WithoutExcitation => "the excitation removed: the input was logged before it was added".into(),
@@ -120,7 +124,7 @@ impl ControllerCheck {
                 Finding::new(Test::Controller, Severity::Note, record, what).number("residual", self.residual),
             );
         }
-        let percent = few(100.0 * self.residual);
+        let percent = if self.residual > 10.0 { "more than 1000".to_owned() } else { few(100.0 * self.residual) };
         if let Some(parts) = &self.parts {
             let [what, advice] = parts.words(first_row, &percent);
             // A controller that did run as declared, but not always, spoils no result.

@@ -88,7 +88,7 @@ impl Recommendation {
     /// `None` where no controller was stated or nothing could be asked.
     pub fn description(&self) -> Option<bool> {
         let asked = |e: &&Evidence| e.question.ends_with(OF_DESCRIPTION) && e.outcome != TestOutcome::NotTested;
-        self.evidence.iter().find(asked).map(Evidence::holds)
+        self.evidence.iter().filter(asked).map(Evidence::holds).reduce(|all, one| all && one)
     }
 
     /// Whether a failed test is about the model, so that its own region is no evidence; those of region and controller are about the loop.

@@ -169,9 +169,9 @@ mod tests {
         let rests = |rests: &[usize]| {
             let mut level = 0;
             let steps = (0..3000).map(|k| ((k * 7) % 32, 1 + k % 3)).chain(rests.iter().map(|rest| (33, *rest)));
-            let of = |(step, samples): (i32, usize)| {
+            let of = |(step, samples): (usize, usize)| {
                 level = 1 - level;
-                vec![f64::from(step + level); samples]
+                vec![(step + level) as f64; samples]
             };
             steps.flat_map(of).collect::<Vec<f64>>()
         };

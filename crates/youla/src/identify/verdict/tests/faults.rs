@@ -154,7 +154,7 @@ fn a_slow_load_below_few_steps_of_the_reference_is_no_variation() {
         let (mut load, mut level, mut reference) = (0.0, 0.0, 0.0);
         let mut record = |rows: usize| {
             let of = |k: usize| {
-                if k % 800 == 0 {
+                if k.is_multiple_of(800) {
                     level = 15.0 * rng.random_range(-1.0..1.0);
                 }
                 reference += 0.02 * (level - reference);

@@ -36,7 +36,7 @@ pub(crate) fn doubts(recommended: Option<&Recommendation>, data: &DataCheck) -> 
     let another = data.findings.iter().find(|f| f.shows_another_controller());
     let shown = another.map(|f| format!("{}. {}", f.what, f.advice));
     let failed = |e: &&Evidence| e.question.ends_with("(controller)") && e.outcome == TestOutcome::Failed;
-    let refuted = || recommended?.evidence.iter().find(failed).map(|e| e.note.clone());
+    let refuted = || recommended?.evidence.iter().find(failed).map(Evidence::to_string);
     let controller = shown.or_else(refuted).map(|why| {
         format!("the design takes over delay and units of the stated controller, and the log shows another one: {why}")
     });

@@ -204,7 +204,8 @@ fn what_no_run_can_do_is_refused_before_it() {
 #[test]
 fn records_shorter_than_the_transient_of_the_filter_keep_certificate_and_redesign() {
     let (folder, code, stderr) = run("transient", 0.98, "[redesign]\n[factors]\nsettle = 5000\n");
-    assert_eq!(code, Some(0), "{stderr}");
+    // LQG gives up stiffness for damping, and says so.
+    assert!(code == Some(3) && stderr.contains("a slow load moves y 8.23 times as far"), "{code:?} {stderr}");
     let summary = json(&folder.join("run/summary.json"));
     let refused = &summary["refused"];
     assert!(refused["signals"].as_str().expect("the reason").contains("`settle` in [factors]"), "{refused}");

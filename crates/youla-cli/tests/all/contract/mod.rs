@@ -31,6 +31,7 @@ fn summary_has_the_documented_structure() {
         "channel_scales",
         "controller_mismatch",
         "data",
+        "doubts",
         "recommended",
         "redesign",
         "reduction",

@@ -74,7 +74,15 @@ const PER_SECOND: [f64; 7] = [1.0, 1e3, 1e6, 1e7, 1e9, 1.0 / 60.0, 1.0 / 3600.0]
 pub(super) fn require_agreement(what: &str, column: &str, times: &[f64], ts: f64) -> Result<()> {
     let Some(step) = uniform_step(times) else { return Ok(()) };
     let near = |expected: f64| (step / expected - 1.0).abs() < UNIFORM;
-    if near(1.0) || PER_SECOND.iter().any(|units| near(units * ts)) {
+    let agrees = match unit_of_time(column).map(|(unit, _)| unit) {
+        None => near(1.0) || PER_SECOND.iter().any(|units| near(units * ts)),
+        Some("milliseconds") => near(1e3 * ts),
+        Some("microseconds") => near(1e6 * ts),
+        Some("nanoseconds") => near(1e9 * ts),
+        Some("minutes") => near(ts / 60.0),
+        Some(_) => near(ts / 3600.0),
+    };
+    if agrees {
         return Ok(());
     }
     let problem = format!(

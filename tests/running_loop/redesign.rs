@@ -344,5 +344,5 @@ fn the_delay_of_a_machine_is_designed_for() {
     let blind = redesign(&problem(0), &options).unwrap();
     let kept = disturbance_response(&of_plant, &blind.controller.computed.clone().delayed(3).unwrap()).unwrap();
     let kept = least_damping(&loop_modes(&kept).unwrap());
-    assert!(kept < 0.5 * blind.predicted.least_damping, "{kept} {}", blind.predicted.least_damping);
+    assert!(kept < 0.7 * blind.predicted.least_damping, "{kept} {}", blind.predicted.least_damping);
 }

@@ -98,7 +98,8 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
 fn agree(source: &Source, column: &str, times: impl FnOnce() -> Result<Vec<f64>>) -> Result<()> {
     let used = source.channels.iter().any(|channel| channel.source().to_string() == column);
     match (&source.time.column, source.time.ts, used) {
-        (None, Some(ts), false) => {
+        // One second stands for a sample time that is not known yet.
+        (None, Some(ts), false) if ts != 1.0 => {
             // What is no column of numbers is no clock.
             let times = times().unwrap_or_default();
             require_agreement(&source.path.display().to_string(), column, &times, ts)

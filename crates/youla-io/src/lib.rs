@@ -75,7 +75,7 @@ pub use model_file::ModelFile;
 pub use npz::{npz_from_bytes, read_npz};
 pub use open::{open, read_bytes, read_text};
 pub use response::{ReadResponse, ResponseSignals, read_response};
-pub use source::{Format, Source, check_unit, read, read_parts, sha256, sha256_of};
+pub use source::{Format, Source, check_unit, read, read_parts, read_rows, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use synchronise::{ChannelRole, ChannelTiming, Placement, StampedChannel, Synchronised, synchronise};
 pub use target::{require_free, require_free_for_settings};

@@ -15,7 +15,7 @@
 use crate::choose::ChannelSpec;
 use crate::csv::CsvOptions;
 use crate::error::{Error, Result};
-use crate::source::{Format, Source, read};
+use crate::source::{Format, Source, read_rows};
 use crate::survey::survey;
 use crate::time::TimeSource;
 use crate::uff::{UffKind, is_uff, read_uff58};
@@ -112,9 +112,8 @@ impl Columns {
     fn record(self, path: &Path, csv: &CsvOptions, chosen: &[String]) -> Result<Record> {
         match self {
             Columns::Named(_) => {
-                let time = TimeSource { ts: Some(1.0), ..TimeSource::default() };
-                let channels = chosen.iter().map(ChannelSpec::named).collect();
-                read(&Source { path: path.to_owned(), format: Format::Detect, time, channels, csv: csv.clone() })
+                let (time, channels) = (TimeSource::default(), chosen.iter().map(ChannelSpec::named).collect());
+                read_rows(&Source { path: path.to_owned(), format: Format::Detect, time, channels, csv: csv.clone() })
             }
             Columns::Read(names, values) => {
                 let channels = names.iter().map(|name| Channel::new(name, "")).collect();

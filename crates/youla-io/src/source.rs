@@ -72,40 +72,51 @@ pub fn read(source: &Source) -> Result<Record> {
     only(read_parts(source)?)
 }
 
+/// Reads the rows of a record whose sample time is not known, or is found in its channels: one second stands for it, whatever `source.time` says.
+///
+/// # Errors
+/// As [`read`] but for those of the sample time.
+pub fn read_rows(source: &Source) -> Result<Record> {
+    only(parts_at(source, &TimeSource::ts(1.0), None)?)
+}
+
 /// Reads a record as described, cut where its time column has gaps if [`crate::Gaps::Split`] says so: together the records
 /// hold all rows of the file in order.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read`]; [`Error::Clock`] for a clock in the file that is not named and contradicts the declared sample time.
 pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
+    let declared = source.time.ts.filter(|_| source.time.column.is_none());
+    parts_at(source, &source.time, declared)
+}
+
+/// With `declared`, a clock in the file that is no channel must agree with that sample time.
+fn parts_at(source: &Source, time: &TimeSource, declared: Option<f64>) -> Result<Vec<Record>> {
+    let what = source.path.display().to_string();
+    let unused = |column: &str| source.channels.iter().all(|channel| channel.source().to_string() != column);
     let variables = match resolve(source)? {
         Format::Mat => read_mat(&source.path)?,
         Format::Npz => read_npz(&source.path)?,
         Format::Csv | Format::Detect => {
-            if let Some((column, times)) = leading_clock(&source.path, &source.csv)? {
-                agree(source, &column, || Ok(times))?;
+            if let Some(ts) = declared
+                && let Some((column, times)) = leading_clock(&source.path, &source.csv)?
+                && unused(&column)
+            {
+                require_agreement(&what, &column, &times, ts)?;
             }
-            return read_csv_parts(&source.path, &source.channels, &source.time, &source.csv);
+            return read_csv_parts(&source.path, &source.channels, time, &source.csv);
         }
     };
-    for clock in variables.leaves().iter().filter(|path| is_clock(path.rsplit('.').next().unwrap_or(path))) {
-        agree(source, clock, || variables.column(clock))?;
-    }
-    variables.record_parts(&source.channels, &source.time)
-}
-
-/// Refuses a clock in the file that is not used and contradicts the declared sample time.
-fn agree(source: &Source, column: &str, times: impl FnOnce() -> Result<Vec<f64>>) -> Result<()> {
-    let used = source.channels.iter().any(|channel| channel.source().to_string() == column);
-    match (&source.time.column, source.time.ts, used) {
-        // One second stands for a sample time that is not known yet.
-        (None, Some(ts), false) if ts != 1.0 => {
+    if let Some(ts) = declared {
+        let last = |path: &str| is_clock(path.rsplit('.').next().unwrap_or(path));
+        for clock in variables.leaves().iter().filter(|path| last(path) && unused(path)) {
             // What is no column of numbers is no clock.
-            let times = times().unwrap_or_default();
-            require_agreement(&source.path.display().to_string(), column, &times, ts)
+            if let Ok(times) = variables.column(clock) {
+                require_agreement(&what, clock, &times, ts)?;
+            }
         }
-        _ => Ok(()),
     }
+    variables.record_parts(&source.channels, time)
 }
 
 /// Refuses a time column in another unit than the second, by its name or a line of units in the file, before anything else is read.

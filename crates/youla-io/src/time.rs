@@ -24,14 +24,21 @@ pub struct TimeSource {
     pub gaps: Gaps,
 }
 
-/// Words of a name that state a unit of time, and how seconds are made of it.
-const UNITS: [(&[&str], &str, &str); 5] = [
-    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], "milliseconds", "/ 1e3"),
-    (&["us", "\u{b5}s", "\u{3bc}s", "usec", "usecs", "micros", "microsecond", "microseconds"], "microseconds", "/ 1e6"),
-    (&["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"], "nanoseconds", "/ 1e9"),
-    (&["min", "mins", "minute", "minutes"], "minutes", "* 60"),
-    (&["h", "hr", "hrs", "hour", "hours"], "hours", "* 3600"),
+/// Words of a name that state a unit of time, how seconds are made of it, and how many of it a second is.
+const UNITS: [(&[&str], &str, &str, f64); 5] = [
+    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], "milliseconds", "/ 1e3", 1e3),
+    (
+        &["us", "\u{b5}s", "\u{3bc}s", "usec", "usecs", "micros", "microsecond", "microseconds"],
+        "microseconds",
+        "/ 1e6",
+        1e6,
+    ),
+    (&["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"], "nanoseconds", "/ 1e9", 1e9),
+    (&["min", "mins", "minute", "minutes"], "minutes", "* 60", 1.0 / 60.0),
+    (&["h", "hr", "hrs", "hour", "hours"], "hours", "* 3600", 1.0 / 3600.0),
 ];
+/// Ticks of 100 ns in a second, which clocks of controllers count.
+const TICKS: f64 = 1e7;
 
 /// The unit of time that a heading or a cell of a line of units states, and how seconds are made of it; `None` for seconds and where it
 /// states none. `t_ms`, `time [ms]`, `Time(us)` and `timeMs` state one.
@@ -41,9 +48,12 @@ const UNITS: [(&[&str], &str, &str); 5] = [
 /// assert_eq!(youla_io::unit_of_time("systems"), None);
 /// ```
 pub fn unit_of_time(heading: &str) -> Option<(&'static str, &'static str)> {
+    stated_unit(heading).map(|(_, unit, to_seconds, _)| (*unit, *to_seconds))
+}
+
+fn stated_unit(heading: &str) -> Option<&'static (&'static [&'static str], &'static str, &'static str, f64)> {
     let words = words_of(heading);
-    let found = UNITS.iter().find(|(names, ..)| words.split(' ').any(|word| names.contains(&word)));
-    found.map(|&(_, unit, to_seconds)| (unit, to_seconds))
+    UNITS.iter().find(|(names, ..)| words.split(' ').any(|word| names.contains(&word)))
 }
 
 /// The words of a heading in small letters, a blank between two.
@@ -66,23 +76,13 @@ pub(super) fn is_clock(heading: &str) -> bool {
     words_of(heading).split(' ').any(|word| CLOCKS.contains(&word))
 }
 
-/// How many of the units of a clock a second, or a tick of 100 ns, is made of.
-const PER_SECOND: [f64; 7] = [1.0, 1e3, 1e6, 1e7, 1e9, 1.0 / 60.0, 1.0 / 3600.0];
-
-/// Refuses a column of a file that names itself a clock, rises evenly, and contradicts the declared sample time in every unit of time; a
-/// counter of rows rises by 1.
+/// Refuses a column of a file that names itself a clock, rises evenly, and contradicts the declared sample time: in the unit that its heading
+/// states, else in every unit of time, a counter of rows rising by 1.
 pub(super) fn require_agreement(what: &str, column: &str, times: &[f64], ts: f64) -> Result<()> {
     let Some(step) = uniform_step(times) else { return Ok(()) };
     let near = |expected: f64| (step / expected - 1.0).abs() < UNIFORM;
-    let agrees = match unit_of_time(column).map(|(unit, _)| unit) {
-        None => near(1.0) || PER_SECOND.iter().any(|units| near(units * ts)),
-        Some("milliseconds") => near(1e3 * ts),
-        Some("microseconds") => near(1e6 * ts),
-        Some("nanoseconds") => near(1e9 * ts),
-        Some("minutes") => near(ts / 60.0),
-        Some(_) => near(ts / 3600.0),
-    };
-    if agrees {
+    let in_any_unit = || UNITS.iter().map(|(.., per_second)| per_second).chain([&1.0, &TICKS]).any(|of| near(of * ts));
+    if stated_unit(column).map_or_else(|| near(1.0) || in_any_unit(), |(.., per_second)| near(per_second * ts)) {
         return Ok(());
     }
     let problem = format!(

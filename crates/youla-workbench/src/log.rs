@@ -83,11 +83,11 @@ pub(crate) fn read(file: &Path, csv: &CsvOptions, columns: &[String]) -> Result<
     let source = youla_io::Source {
         path: file.to_owned(),
         format: youla_io::Format::Detect,
-        time: youla_io::TimeSource::ts(1.0),
+        time: youla_io::TimeSource::default(),
         channels: columns.iter().map(channel).collect(),
         csv: csv.clone(),
     };
-    youla_io::read(&source).map_err(Refusal::from)
+    youla_io::read_rows(&source).map_err(Refusal::from)
 }
 
 #[cfg(test)]

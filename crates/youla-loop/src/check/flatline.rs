@@ -76,9 +76,9 @@ pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
     let share = (repeated + 1 - samples) as f64 / others;
     let by_chance = |samples: usize| others * share.powf(samples as f64 - 1.0) >= CHANCE;
     // An actuator of few steps rests at set points for long, now and then.
-    let rest = longest[RESTS].0;
-    let rests = rest * A_REST > samples && !by_chance(rest);
-    (!by_chance(samples) && !rests && several(values, options.switched_levels)).then_some(Standstill {
+    let other = longest[RESTS].0;
+    let often = other * A_REST > samples && !by_chance(other);
+    (!by_chance(samples) && !often && several(values, options.switched_levels)).then_some(Standstill {
         first,
         samples,
         value: values[first],

@@ -12,7 +12,7 @@ use std::path::Path;
 use youla::lti::Discrete;
 use youla::signal::LoopRecord;
 use youla::signal::Record;
-use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, check_unit, read, sha256};
+use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, check_unit, read, read_rows, sha256};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
 
 /// What all records of a check share.
@@ -81,18 +81,20 @@ fn check_file(
     }
     let clock = job.time.column.clone().map(|place| ChannelSpec::from(TIME, place, ""));
     let wanted: Vec<ChannelSpec> = job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock.clone()).collect();
+    let clock_is_a_channel = clock.is_some();
     let source = Source {
         path,
         format: Format::Detect,
-        // The time column is a channel here; whatever it holds, the rows are read.
-        time: TimeSource::ts(job.time.ts.unwrap_or(1.0)),
+        time: job.time.clone(),
         channels: job.computed.to_read(&wanted),
         csv: job.csv.clone(),
     };
     if let Some(clock) = clock.filter(|clock| job.computed.formula_of(clock).is_none()) {
         check_unit(&source, &clock.source())?;
     }
-    let record = job.computed.apply(&wanted, read(&source)?, 1)?;
+    // A time column is a channel here; whatever it holds, the rows are read.
+    let rows = if clock_is_a_channel { read_rows(&source)? } else { read(&source)? };
+    let record = job.computed.apply(&wanted, rows, 1)?;
     let continuous = if job.time.gaps == Gaps::Split { between_gaps(job, record)? } else { vec![record] };
     let found = parts(file, label, continuous)?;
     found.iter().map(|part| check_part(job, file, part, controller)).collect()

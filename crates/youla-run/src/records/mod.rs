@@ -247,7 +247,7 @@ fn read_file(
         Some(time) => {
             // The rows first, whatever their time; then their time from their columns.
             let all = [&wanted[..], std::slice::from_ref(&time)].concat();
-            let rows = youla_io::read(&source(TimeSource::ts(1.0), &all)).map_err(of_file)?;
+            let rows = youla_io::read_rows(&source(clock.clone(), &all)).map_err(of_file)?;
             let times = computed.apply(std::slice::from_ref(&time), rows.clone(), 1)?.column(&time.name)?.to_vec();
             clock.cut(&rows, &times)?
         }

@@ -126,7 +126,7 @@ pub enum Error {
         decimal: Option<&'static str>,
     },
     /// A line of a text file has more or fewer fields than the first one.
-    #[error("{}, line {line}: {found} fields, but the first line has {expected}", path.display())]
+    #[error("{}, line {line}: {found} fields, but the first line has {expected}; {}", path.display(), lines_to_skip(*line))]
     FieldCount {
         /// The file.
         path: PathBuf,
@@ -307,6 +307,23 @@ fn step_remedy(dt: f64) -> &'static str {
     }
 }
 
+/// Lines up to which those before one with other fields may be notes above the names.
+const LONGEST_NOTES: usize = 20;
+
+/// The setting that passes over the lines that are no data: notes above the names, or the line itself.
+fn lines_to_skip(line: usize) -> String {
+    let itself = format!("for a line that is no row, as the last one of a log that was cut, --skip-lines {line}");
+    let notes: Vec<String> = (1..line).map(|k| k.to_string()).collect();
+    match (2..=LONGEST_NOTES).contains(&line) {
+        true => format!(
+            "for notes above the names --skip-lines {} (csv = {{ skip_lines = [{}] }} in [data]), {itself}",
+            notes.join(","),
+            notes.join(", ")
+        ),
+        false => format!("{itself} (csv = {{ skip_lines = [{line}] }} in [data])"),
+    }
+}
+
 /// The setting that makes a cell with the other decimal sign a number.
 fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     let missing = ["", "nan", "na", "null", "none", "-"].contains(&text.trim().to_ascii_lowercase().as_str());
@@ -320,7 +337,7 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
         |sign| format!(" with the declared decimal sign; set decimal = \"{sign}\" if the whole file uses the {sign}");
     match decimal {
         Some(sign) => remedy(sign),
-        None if text.contains(':') => "; a date with a time is read as 2026-03-01T10:00:00.000; of another stamp, leave the column out and state \
+        None if text.contains(':') => "; a date with a time is read as 2026-03-01T10:00:00.000 or 01.03.2026 10:00:00.000; of another stamp, leave the column out and state \
                                        the sample time (sample_time in [data], --sample-time)"
             .into(),
         None if text.chars().all(|c| c.is_ascii_digit() || "+-.,' \u{a0}".contains(c)) => {

@@ -137,7 +137,9 @@ impl Lines {
                 self.line.drain(..3);
             }
             let text = self.line.trim_ascii();
-            let note = text.strip_prefix(b"#").or_else(|| text.strip_prefix(b"%"));
+            // The first line `sep=;` tells a spreadsheet the delimiter that the names have.
+            let of_spreadsheet = || (self.number == 1 && text.len() == 5).then(|| text.strip_prefix(b"sep=")).flatten();
+            let note = text.strip_prefix(b"#").or_else(|| text.strip_prefix(b"%")).or_else(of_spreadsheet);
             if note.is_none() && !text.is_empty() && !self.skip.contains(&self.number) {
                 return Ok(true);
             }

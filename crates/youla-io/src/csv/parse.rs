@@ -300,8 +300,10 @@ fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
     value.or_else(|| instant(text)).filter(|x| x.is_finite())
 }
 
-/// Seconds since 1970 of a date with a time such as `2026-03-01T10:00:00.25Z`; without an offset as if it were UTC.
+/// Seconds since 1970 of a date with a time such as `2026-03-01T10:00:00.25Z` or `01.03.2026 10:00:00,25`; without an offset as if it were UTC.
 fn instant(text: &str) -> Option<f64> {
+    let day_first = day_first(text);
+    let text = day_first.as_deref().unwrap_or(text);
     let toml::value::Datetime { date: Some(date), time: Some(time), offset } = text.parse().ok()? else { return None };
     let ahead = if let Some(Offset::Custom { minutes }) = offset { i64::from(minutes) } else { 0 };
     // Years from March on: a leap day is the last of its year.
@@ -311,6 +313,18 @@ fn instant(text: &str) -> Option<f64> {
     let minutes = (24 * days + i64::from(time.hour)) * 60 + i64::from(time.minute) - ahead;
     let seconds = 60 * minutes + i64::from(time.second.unwrap_or(0));
     Some(seconds as f64 + f64::from(time.nanosecond.unwrap_or(0)) / 1e9)
+}
+
+/// A date with dots, whose day comes first wherever it is written, with the year first; with slashes either may be the day.
+fn day_first(text: &str) -> Option<String> {
+    let (date, time) = text.split_once([' ', 'T'])?;
+    let mut parts = date.split('.').map(|part| part.parse::<u16>().ok());
+    let (Some(Some(day)), Some(Some(month)), Some(Some(year)), None) =
+        (parts.next(), parts.next(), parts.next(), parts.next())
+    else {
+        return None;
+    };
+    Some(format!("{year:04}-{month:02}-{day:02}T{}", time.replacen(',', ".", 1)))
 }
 
 /// Whether a cell of the first line is no name: a number of any kind, with either decimal sign.

@@ -43,6 +43,7 @@ fn names_and_numbers_in_every_dialect() {
 
 #[test]
 fn errors_say_where() {
+    let cut = format!("a,b\n{}3\n", "1,2\n".repeat(30));
     for (text, part) in [
         ("a,b\n1,2\n# x\n3,oops\n", "line 4, column b: \"oops\" is not a finite number; a line of units or notes"),
         ("a,b\n1,NaN\n", "line 2, column b: \"NaN\""),
@@ -51,6 +52,14 @@ fn errors_say_where() {
         ("1,2\n1,b\n", "line 2, column #2: \"b\""),
         ("a,b\n1,2\n3\n", "line 3: 1 fields, but the first line has 2"),
         ("a,b\n1,2,3\n", "line 2: 3 fields"),
+        (
+            "Rig 7 b\nBy: X\na,b\n1,2\n",
+            "for notes above the names --skip-lines 1 (csv = { skip_lines = [1] } in [data])",
+        ),
+        (
+            cut.as_str(),
+            "line 32: 1 fields, but the first line has 2; for a line that is no row, as the last one of a log that was cut, --skip-lines 32",
+        ),
         ("a,b\n", "there is no line with data"),
         ("# only\n", "there is no line with data"),
         ("", "the file is empty (0 bytes)"),
@@ -299,4 +308,16 @@ fn a_clock_that_is_not_used_must_agree_with_the_declared_sample_time() {
         let refused = read_with(heading, step, ts).unwrap_err().to_string();
         assert!(refused.contains(heading) && refused.contains("sample_time"), "{refused}");
     }
+}
+
+/// A date with dots has the day first, also with a decimal comma; one with slashes is not guessed. `sep=;` is a note of a spreadsheet.
+#[test]
+fn stamps_of_spreadsheets() {
+    let clock = TimeSource::column("t".parse().unwrap());
+    let rows = "01.03.2026 10:00:00,25;1\n1.3.2026 10:00:00,50;2\n01.03.2026 10:00:00,75;3\n";
+    let record = read(format!("sep=;\nt;y\n{rows}").as_bytes(), &[], &clock).unwrap();
+    assert_eq!((record.ts(), record.column("y").unwrap()), (0.25, &[1.0, 2.0, 3.0][..]));
+    let slashes = rows.replace("1.3.", "1/3/").replace("01.03.", "01/03/");
+    let message = read(format!("t;y\n{slashes}").as_bytes(), &[], &clock).unwrap_err().to_string();
+    assert!(message.contains("is read as 2026-03-01T10:00:00.000 or 01.03.2026 10:00:00.000"), "{message}");
 }

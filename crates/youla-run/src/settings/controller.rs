@@ -281,7 +281,8 @@ impl ControllerSettings {
             }
         };
         let system = if *feedback == Feedback::Negative { system.negated() } else { system };
-        Ok(RunningController::new(delayed(system, delay)?))
+        // States in excess, as those of a transfer matrix that was realised entry by entry, are poles of every loop.
+        Ok(RunningController::new(delayed(system.minimal()?, delay)?))
     }
 }
 
@@ -329,4 +330,22 @@ fn delayed(system: StateSpace<Discrete>, delay: usize) -> Result<StateSpace<Disc
         return Err(youla::Error::OutOfRange { what, value: delay as f64, must: "at most 1000 samples" }.into());
     }
     Ok(system.delayed(delay)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A law of two channels over one denominator with an integrator has it four times; where its response has it twice, so has the controller, and
+    /// no pole of a loop lies on the unit circle.
+    #[test]
+    fn states_in_excess_of_a_stated_law_are_left_out() {
+        let text = "[transfer_function]\ndomain = \"discrete\"\nfeedback = \"negative\"\n\
+            numerator = [[[1.0, -0.9], [0.3]], [[0.2], [2.0, -1.8]]]\n\
+            denominator = [[[1.0, -1.0], [1.0, -1.0]], [[1.0, -1.0], [1.0, -1.0, 0.0]]]\n";
+        let settings: ControllerSettings = toml::from_str(text).unwrap();
+        let found = settings.controller(Discrete::new(0.1).unwrap(), None, Path::new(".")).unwrap();
+        let poles = found.system().poles().unwrap();
+        assert_eq!(poles.iter().filter(|p| (*p - 1.0).norm() < 1e-6).count(), 2, "{poles:?}");
+    }
 }

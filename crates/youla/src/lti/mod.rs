@@ -5,6 +5,7 @@ mod discretise;
 mod eigen;
 mod gains;
 mod initial;
+mod minimal;
 pub mod modes;
 mod norms;
 mod partitioned;

@@ -3,7 +3,7 @@
 use crate::Mat;
 use crate::identify::likelihood::deviation::mode_estimates::ModeEstimate;
 use crate::identify::likelihood::deviation::region::Region;
-use crate::identify::verdict::limits::BEYOND_CHANCE;
+use crate::identify::verdict::limits::{BEYOND_CHANCE, NEAR_THE_LIMIT};
 use crate::identify::verdict::loop_ratio::LoopRatio;
 use crate::lti::{Discrete, StateSpace};
 
@@ -211,6 +211,17 @@ impl Evidence {
         Evidence { significance: Some(significance), outcome, ..self }
     }
 
+    /// Passed too where the figure, an estimate that is so many of its standard deviations from zero, exceeds its limit by hardly more than its
+    /// deviation: the records do not show then that it is beyond it.
+    pub(crate) fn unless_near_the_limit(self, significance: f64) -> Self {
+        let over = significance * (1.0 - self.limit / self.figure);
+        if self.outcome == TestOutcome::Passed || over > NEAR_THE_LIMIT {
+            return self;
+        }
+        let note = format!("{}; above the limit by {} standard deviations, which is chance", self.note, figure(over));
+        Evidence { outcome: TestOutcome::Passed, note, ..self }
+    }
+
     /// The size of an imperfection, which decides nothing by itself: its consequence is in the region of the model.
     #[must_use]
     pub(crate) fn reported(self) -> Self {
@@ -280,5 +291,23 @@ pub fn figure(value: f64) -> String {
         v if v >= 10.0 => format!("{value:.1}"),
         v if v >= 1.0 => format!("{value:.2}"),
         _ => format!("{value:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 0.056 with a deviation of 0.009 is no proof of more than 0.05; 0.137 with 0.014 is one, and so is 0.056 with 0.001.
+    #[test]
+    fn a_size_fails_where_the_records_show_it_beyond_its_limit() {
+        let of = |figure: f64, deviation: f64| {
+            let significance = figure / deviation;
+            let test = Evidence::new("size", figure, 0.05).beyond_chance(significance).noted("friction");
+            test.unless_near_the_limit(significance)
+        };
+        assert!(of(0.056, 0.009).holds() && !of(0.137, 0.014).holds() && !of(0.056, 0.001).holds());
+        assert_eq!(of(0.056, 0.009).note, "friction; above the limit by 0.667 standard deviations, which is chance");
+        assert!(of(0.04, 0.001).holds() && of(0.04, 0.001).note == "friction");
     }
 }

@@ -41,6 +41,9 @@ pub(crate) const OVERALL_CHANCE: f64 = 3.0;
 /// exceeds it by chance.
 pub(crate) const BEYOND_CHANCE: f64 = 5.0;
 
+/// Standard deviations by which an estimated size may exceed its limit: one in 40 by chance where it is at the limit.
+pub(crate) const NEAR_THE_LIMIT: f64 = 2.0;
+
 /// Largest part of the margin of the loop that the 95 % region may take: half of the margin is left.
 pub(crate) const LARGEST_RATIO_OF_LOOP: f64 = 0.5;
 /// Largest error that the excitation shows, as `|E K (I - G K)^-1|`: beside it the loop keeps its margins within 2 dB. Loops of the

@@ -289,8 +289,8 @@ impl<'a> Beside<'a> {
         let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
         let mut of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).beyond_chance(significance);
         if found {
-            let name = self.shapes[f / inputs].name();
-            of_size = of_size.noted(format!("most likely {name} at input {}", f % inputs + 1));
+            let note = format!("most likely {} at input {}", self.shapes[f / inputs].name(), f % inputs + 1);
+            of_size = of_size.noted(note).unless_near_the_limit(significance);
         }
         let at_output = self.most(self.at_inputs().end..self.drift());
         let (c, of_backlash) = self.single(at_output);

@@ -214,11 +214,14 @@ impl Problem<'_> {
 
     /// Poles of the loop outside of the unit circle, each with its distance to the nearest pole of the plant.
     ///
-    /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`.
+    /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`; one that the plant does
+    /// not move is that of the statement of the controller, as rounding of a polynomial with an integrator leaves it.
     pub(super) fn unstable_poles(&self, choice: &Choice) -> Vec<(c64, f64)> {
         let least = GROWTH / self.samples().0 as f64;
+        let of_controller = self.feedback.and_then(|k| k.poles().ok()).unwrap_or_default();
+        let moved = |z: &c64, apart: f64| apart > least && of_controller.iter().all(|pole| (pole - z).norm() > least);
         let outside = self.poles_outside(choice).into_iter();
-        outside.filter(|(z, apart)| z.norm().ln() > least || *apart > least).collect()
+        outside.filter(|(z, apart)| z.norm().ln() > least || moved(z, *apart)).collect()
     }
 
     /// The same with those on the circle that the feedback does not move.

@@ -316,7 +316,7 @@ fn stamps_of_spreadsheets() {
     let clock = TimeSource::column("t".parse().unwrap());
     let rows = "01.03.2026 10:00:00,25;1\n1.3.2026 10:00:00,50;2\n01.03.2026 10:00:00,75;3\n";
     let record = read(format!("sep=;\nt;y\n{rows}").as_bytes(), &[], &clock).unwrap();
-    assert_eq!((record.ts(), record.column("y").unwrap()), (0.25, &[1.0, 2.0, 3.0][..]));
+    assert_eq!((record.time().ts(), record.column("y").unwrap()), (0.25, &[1.0, 2.0, 3.0][..]));
     let slashes = rows.replace("1.3.", "1/3/").replace("01.03.", "01/03/");
     let message = read(format!("t;y\n{slashes}").as_bytes(), &[], &clock).unwrap_err().to_string();
     assert!(message.contains("is read as 2026-03-01T10:00:00.000 or 01.03.2026 10:00:00.000"), "{message}");

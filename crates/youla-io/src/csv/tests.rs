@@ -53,7 +53,7 @@ fn errors_say_where() {
         ("a,b\n1,2\n3\n", "line 3: 1 fields, but the first line has 2"),
         ("a,b\n1,2,3\n", "line 2: 3 fields"),
         (
-            "Rig 7 b\nBy: X\na,b\n1,2\n",
+            "Rig no b\nBy: X\na,b\n1,2\n",
             "for notes above the names --skip-lines 1 (csv = { skip_lines = [1] } in [data])",
         ),
         (

@@ -210,6 +210,7 @@ PIDS: dict[str, dict[str, Any]] = {
     "tustin": {"pid": {"kp": 2.0, "ki": 3.0, "kd": 0.01, "derivative_filter": 0.02, "discretisation": "tustin", "delay": 2}},
     "ideal": {"ideal_pid": {"kp": 2.0, "ti": 0.5, "td": 0.01, "derivative_filter": 0.02, "discretisation": "tustin"}},
     "ideal without an integral": {"ideal_pid": {"kp": 2.0, "td": 0.01, "discretisation": "backward-euler", "delay": 1}},
+    "cascade": {"cascade": {"position": {"kp": 20.0}, "velocity": {"kp": 0.02, "ki": 0.1}, "discretisation": "backward-euler"}},
 }
 
 

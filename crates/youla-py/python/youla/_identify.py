@@ -21,7 +21,7 @@ from ._response import Response, data_of
 from ._result import Run
 from ._sources import refuse_log
 from ._systems import UnstatedSign, controller_table, nominal_table
-from ._types import Log, Table
+from ._types import Feedback, Hold, Log, Table
 
 Records = Record | Sequence[Record]
 
@@ -31,8 +31,8 @@ def identify(
     *,
     nominal: Any = None,
     controller: Any = None,
-    feedback: str | None = None,
-    hold: str | None = None,
+    feedback: Feedback | None = None,
+    hold: Hold | None = None,
     verify: Records | None = None,
     name: str | None = None,
     **options: Mapping[str, Any],
@@ -50,7 +50,8 @@ def identify(
         zero-order hold. A mapping is the table ``[nominal]`` of run.toml. ``hansen`` needs it.
     controller : as `nominal`
         The controller that ran; 0 where none ran. A mapping is the table ``[controller]``, for example
-        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``; lists hold the gains of a PID in each loop, ``"kp": [2.0, 1.5]``.
+        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``; lists hold the gains of a PID in each loop, ``"kp": [2.0, 1.5]``. A
+        ``cascade`` of a position and a velocity loop takes the commanded position as `reference` of the record.
     feedback : {"negative", "positive"}
         Sign with which the controller is written: ``u = K (r - y)`` or ``u = K (y - r)``. Needed where a controller ran and
         its mapping does not state it; the message for a missing one says with which the record agrees.
@@ -120,8 +121,8 @@ def _of_response(
     verify: Records | None,
     nominal: Any,
     controller: Any,
-    feedback: str | None,
-    hold: str | None,
+    feedback: Feedback | None,
+    hold: Hold | None,
     name: str | None,
     options: Mapping[str, Any],
 ) -> tuple[dict[str, Any], list[Log], Table]:
@@ -155,8 +156,8 @@ def prepare(
     verify: Records | None,
     nominal: Any,
     controller: Any,
-    feedback: str | None,
-    hold: str | None,
+    feedback: Feedback | None,
+    hold: Hold | None,
     name: str | None,
     options: Mapping[str, Any],
 ) -> tuple[dict[str, Any], list[Log]]:

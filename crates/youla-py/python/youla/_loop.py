@@ -16,6 +16,7 @@ from ._errors import InputError
 from ._model import Complex, Model, _signal
 from ._options import plain
 from ._systems import as_model, controller_table, nominal_table, sign_of
+from ._types import Feedback, Hold
 
 
 #: Further options of `excite`.
@@ -52,7 +53,7 @@ class Certificate:
         return f"<youla.Certificate: {'stable' if self.stable else 'unstable'}, {len(self.poles)} poles, largest |z| {largest}{peak}>"
 
 
-def _loop(plant: Any, controller: Any, feedback: str | None) -> tuple[Model, Model]:
+def _loop(plant: Any, controller: Any, feedback: Feedback | None) -> tuple[Model, Model]:
     """Plant and controller of one sample time, the controller with positive feedback."""
     g = as_model(plant, "plant")
     p, m = g.d.shape
@@ -67,7 +68,7 @@ def _loop(plant: Any, controller: Any, feedback: str | None) -> tuple[Model, Mod
     return g, Model(k.a, k.b, sign * k.c, sign * k.d, dt=g.dt)
 
 
-def certify(plant: Any, controller: Any, *, feedback: str | None = None) -> Certificate:
+def certify(plant: Any, controller: Any, *, feedback: Feedback | None = None) -> Certificate:
     """Test whether a controller stabilises a model.
 
     Parameters
@@ -110,7 +111,7 @@ def simulate_loop(
     excitation: Any = None,
     reference: Any = None,
     noise: Any = None,
-    feedback: str | None = None,
+    feedback: Feedback | None = None,
 ) -> tuple[Array, Array]:
     """Simulate a loop ``u = K (r - y) + d`` from rest; y is measured with the noise.
 
@@ -233,8 +234,8 @@ def excite(
     band: Sequence[float],
     seconds: float | None = None,
     samples: int | None = None,
-    feedback: str | None = None,
-    hold: str | None = None,
+    feedback: Feedback | None = None,
+    hold: Hold | None = None,
     **options: Any,
 ) -> Excitation:
     """Make an excitation for the plant input of a loop.

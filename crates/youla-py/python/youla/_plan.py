@@ -22,6 +22,7 @@ from ._result import Run
 from ._study import Folder, _prepared
 from ._systems import as_model, sign_of
 from ._tasks import MOST_TASKS, Progress, Row, Rows, key_of, run_tasks
+from ._types import Feedback
 
 #: Quantile of the normal distribution for 95 %.
 _Z95 = 1.959963984540054
@@ -192,7 +193,7 @@ def study(
     n: int = 20,
     seed: int | None = None,
     noise: Any = None,
-    feedback: str | None = None,
+    feedback: Feedback | None = None,
     executor: Executor | None = None,
     folder: Folder = None,
     progress: Progress | None = None,
@@ -298,7 +299,7 @@ def _twin(plant: Any, noise: Any) -> tuple[tuple[System, System], Array]:
     return ((g.a, g.b, g.c, g.d, g.dt), wide), np.diag(np.broadcast_to(sizes, (p,)).astype(np.float64))
 
 
-def _condition(given: Any, index: int, plant: Model, k: Model, feedback: str, seed: int) -> dict[str, Any]:
+def _condition(given: Any, index: int, plant: Model, k: Model, feedback: Feedback, seed: int) -> dict[str, Any]:
     """A condition that `excite` takes."""
     what = f"conditions[{index}]"
     found = table(given, what, "{'amplitude': 1.0, 'band': [1, 100], 'seconds': 10}")

@@ -19,6 +19,7 @@ from ._optional import need
 from ._options import check_options, check_order, in_python, plain
 from ._record import Record
 from ._result import Run
+from ._types import Feedback, Hold
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Check:
 
 
 def check(
-    record: Records, *, nominal: Any = None, controller: Any = None, feedback: str | None = None, hold: str | None = None,
+    record: Records, *, nominal: Any = None, controller: Any = None, feedback: Feedback | None = None, hold: Hold | None = None,
     **options: Mapping[str, Any],
 ) -> Check:  # fmt: skip
     """Check records before identifying from them.

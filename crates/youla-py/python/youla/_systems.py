@@ -17,11 +17,12 @@ from ._model import Model
 from ._optional import need
 from ._options import plain
 from ._sources import _is
+from ._types import Feedback, Hold
 
 Table = dict[str, Any]
 
 #: Forms of [controller] and [nominal] in run.toml.
-CONTROLLERS = ("difference_equation", "transfer_function", "state_space", "pid", "ideal_pid", "model_file", "observer")
+CONTROLLERS = ("difference_equation", "transfer_function", "state_space", "pid", "ideal_pid", "cascade", "model_file", "observer")
 NOMINALS = ("transfer_function", "state_space", "model_file")
 
 
@@ -35,7 +36,7 @@ def nominal_table(nominal: Any, dt: float, ports: tuple[int, int]) -> Table:
     return {form: table}
 
 
-def controller_table(controller: Any, feedback: str | None, hold: str | None, dt: float, ports: tuple[int, int]) -> Table:
+def controller_table(controller: Any, feedback: Feedback | None, hold: Hold | None, dt: float, ports: tuple[int, int]) -> Table:
     """Return [controller]; `ports` are the numbers of inputs and outputs of the plant."""
     feedback = sign_of(controller, feedback)
     check_hold(hold)
@@ -57,7 +58,7 @@ def controller_table(controller: Any, feedback: str | None, hold: str | None, dt
 def _form(controller: Mapping[str, Any]) -> tuple[str, Table]:
     """The form of a controller with its keys."""
     ((form, table),) = _named(controller, CONTROLLERS, "controller").items()
-    if form in ("pid", "ideal_pid") and "discretisation" not in table:
+    if form in ("pid", "ideal_pid", "cascade") and "discretisation" not in table:
         raise InputError(f"controller[{form!r}] lacks 'discretisation'; give 'backward-euler' (backward differences) or 'tustin', as the machine computes it")
     return form, table
 
@@ -70,7 +71,7 @@ class UnstatedSign(InputError):
 SIGNS = ("negative (u = K (r - y))", "positive (u = K (y - r))")
 
 
-def sign_of(controller: Any, feedback: Any) -> str:
+def sign_of(controller: Any, feedback: Any) -> Feedback:
     """Return the sign with which a controller is written; it is never guessed. No controller, 0 or None, has none."""
     if feedback is None:
         inner = next(iter(controller.values()), None) if isinstance(controller, Mapping) else None
@@ -81,7 +82,7 @@ def sign_of(controller: Any, feedback: Any) -> str:
         else:
             raise UnstatedSign("feedback is missing: give feedback='negative' for u = K (r - y), or feedback='positive' for u = K (y - r)")
     choice(feedback, "feedback", SIGNS)
-    return str(feedback)
+    return "negative" if feedback == "negative" else "positive"
 
 
 def check_hold(hold: Any) -> None:

@@ -208,7 +208,7 @@ impl Delay {
             all.push(finding.number("lag", lag as f64).advice(advice));
         }
         for (output, lags) in outputs.iter().zip(&self.first) {
-            for (input, first) in inputs.iter().zip(lags) {
+            for (j, (input, first)) in inputs.iter().zip(lags).enumerate() {
                 let what = match first {
                     Some(0) => format!("it answers {} in the same sample", input.name),
                     Some(lag) if *lag > 1 => format!(
@@ -222,8 +222,11 @@ impl Delay {
                     Some(0) => {
                         "Use feedthrough = \"estimated\", or check whether the output is logged one sample late or the input early"
                     }
-                    _ => {
+                    _ if self.first.iter().all(|lags| lags.get(j) == Some(first)) => {
                         "State it as `dead_time` in [recommended] if it is known; then the model needs no states for it"
+                    }
+                    _ => {
+                        "`dead_time` in [recommended] holds the least of all outputs for an input; the model has states for what is more"
                     }
                 };
                 let finding = Finding::new(Test::Delay, Severity::Note, record, what).channel(&output.name);

@@ -36,6 +36,8 @@ mod recommendation;
 pub(super) mod search;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod two_inputs;
 
 pub use super::subspace::Experiment;
 pub use super::verdict::LoopRatio;

@@ -37,12 +37,12 @@ pub(crate) use witness::Witness;
 
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::choose::loads::Nuisance;
-use crate::identify::likelihood::choose::problem::{Problem, Solution};
+use crate::identify::likelihood::choose::problem::{GROWTH, Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::response_error::ResponseError;
 use crate::identify::likelihood::deviation::{Directions, grid};
-use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
+use crate::identify::likelihood::{Evidence, LoopKnowledge, TestOutcome, figure as figure_of};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
@@ -117,7 +117,7 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     if let Some(known) = on.known {
         evidence.extend(controller::controller(known, on.plant)?);
     }
-    evidence.extend(feedback.map(|k| stability(on.plant, on.region, k)).transpose()?.flatten());
+    evidence.extend(feedback.map(|k| stability((on.plant, on.region), k, on.spectra.samples())).transpose()?.flatten());
     let weigh = |share: f64, squares: &[f64]| in_loop(loops.as_ref(), on, share / ts, squares);
     if let Some(witness) = on.witness {
         evidence.push(indirect(on, witness, &weigh));
@@ -154,7 +154,7 @@ pub(crate) fn of_response(
     let loops = Loops::new(plant, region, feedback)?;
     let (test, judgement) = of_region(plant, region, loops.as_ref(), &|_, _, _| true)?;
     let mut evidence: Vec<Evidence> =
-        feedback.map(|k| stability(plant, region, k)).transpose()?.flatten().into_iter().collect();
+        feedback.map(|k| stability((plant, region), k, usize::MAX)).transpose()?.flatten().into_iter().collect();
     evidence.push(test);
     Ok(Judgement { evidence, ..judgement })
 }
@@ -245,9 +245,16 @@ fn excitation(on: &Judged<'_>) -> Evidence {
     Evidence::new(question, if on.witness.is_some() { 0.0 } else { 1.0 }, 0.0)
 }
 
-/// Whether the controller stabilises the model, as it did the plant: the largest magnitude of a pole of the loop, by how many of its
-/// standard deviations it exceeds 1.
-fn stability(plant: &StateSpace<Discrete>, region: &Region, k: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
+/// Growth over the records, as a logarithm, that says nothing: one per cent.
+const NO_GROWTH: f64 = 0.01;
+
+/// Whether the controller stabilises the model, as it did the plant: the largest magnitude of a pole of the loop. One outside of the circle by less
+/// than its standard deviation that grows by less than e^2 over the records is not shown to be outside.
+fn stability(
+    (plant, region): (&StateSpace<Discrete>, &Region),
+    k: &StateSpace<Discrete>,
+    samples: usize,
+) -> Result<Option<Evidence>> {
     if k.is_zero() {
         return Ok(None);
     }
@@ -263,7 +270,15 @@ fn stability(plant: &StateSpace<Discrete>, region: &Region, k: &StateSpace<Discr
         return Ok(Some(evidence));
     }
     let deviation = region.intervals(0.95, radius)?[0].deviation;
-    Ok(Some(evidence.noted(format!("its standard deviation is {deviation:.1e}"))))
+    let size = format!("its standard deviation is {deviation:.1e}");
+    // Neither the estimate nor growth in the records tells it from one inside: two integrators of a law whose coefficients were rounded split by less.
+    let growth = largest.ln() * samples as f64;
+    let shown = growth > GROWTH || growth > NO_GROWTH && largest - 1.0 > deviation;
+    if shown {
+        return Ok(Some(evidence.noted(size)));
+    }
+    let note = format!("{size}: the records do not tell it from a pole inside of the unit circle");
+    Ok(Some(Evidence { outcome: TestOutcome::Passed, ..evidence.noted(note) }))
 }
 
 /// The difference between the responses that the excitation shows in groups of records, in the loop, largest over frequency.

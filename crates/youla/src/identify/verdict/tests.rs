@@ -1,7 +1,7 @@
 //! Each test of the verdict with one planted fault that fires it, beside the same loop without the fault.
 
 use crate::control::{RunningController, closed_loop, with_input_port};
-use crate::identify::likelihood::{Evidence, LikelihoodOptions, TestOutcome};
+use crate::identify::likelihood::{Evidence, Experiment, LikelihoodOptions, TestOutcome, recommend};
 use crate::identify::{Identified, identify};
 use crate::linalg::block;
 use crate::lti::{Continuous, Discrete, StateSpace, frequency_response, simulate};
@@ -289,4 +289,27 @@ fn known_errors_of_the_outputs_are_neither_noise_nor_another_law() {
             .sum::<f64>()
     });
     assert!(without < 0.1 * as_noise, "{without:.2e} {as_noise:.2e}");
+}
+
+/// A gain that puts the pole of the loop outside of the circle by less than its deviation, and so that it hardly grows in the records, is not shown
+/// to be unstable; one with which it grows by e^40 is.
+#[test]
+fn a_pole_of_the_loop_at_the_circle_is_not_shown_to_be_outside() {
+    let (rng, time) = (&mut ChaCha8Rng::seed_from_u64(3), Discrete::new(1.0).unwrap());
+    let mut normal = |size: f64| Mat::from_fn(4000, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+    let (u, e) = (normal(1.0), normal(0.5));
+    let one = |x: f64| Mat::from_fn(1, 1, |_, _| x);
+    let plant = StateSpace::new(one(0.9), one(1.0), one(1.0), one(0.0), time).unwrap();
+    let y = simulate(&plant, u.as_ref(), &[0.0]).unwrap() + e;
+    let records = [Experiment::new(u.as_ref(), y.as_ref())];
+    let found = recommend(&records, &[], None, time, &LikelihoodOptions::default()).unwrap();
+    let gain = (found.plant.b() * found.plant.c())[(0, 0)];
+    let asked = |pole: f64| {
+        let k = StateSpace::gain(one((pole - found.plant.a()[(0, 0)]) / gain), time).unwrap();
+        super::stability((&found.plant, &found.region), &k, 4000).unwrap().unwrap().outcome
+    };
+    assert_eq!((found.order, found.dead_time[0]), (1, 0));
+    let outcomes = [0.999, 1.0 + 1e-7, 1.0 + 1e-4, 1.01].map(asked);
+    let expected = [TestOutcome::Passed, TestOutcome::Passed, TestOutcome::Passed, TestOutcome::Failed];
+    assert_eq!(outcomes, expected);
 }

@@ -30,7 +30,7 @@ const UNSTABLE: f64 = 1e12;
 
 /// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less, nor a disturbance at one
 /// frequency in a closed one.
-const GROWTH: f64 = 2.0;
+pub(crate) const GROWTH: f64 = 2.0;
 
 /// A found model with the delays it was found for.
 #[derive(Clone)]

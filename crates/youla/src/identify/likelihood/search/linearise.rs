@@ -17,7 +17,7 @@ use crate::identify::likelihood::data::lanes::LANES;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use crate::linalg::TINY;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, Par, c64};
+use faer::{Accum, Col, Mat, Par, Scale, c64};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -137,18 +137,45 @@ pub(crate) const MOST_COEFFICIENTS: usize = 100;
 
 /// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N.
 pub(crate) fn without(factor: Mat<f64>, columns: Range<usize>) -> Mat<f64> {
-    let (first, count) = (columns.start, columns.len());
-    if count == 0 {
+    let kept: Vec<usize> = columns.clone().collect();
+    without_some(factor, columns, &kept)
+}
+
+/// The same of columns of which some suffice: those are free, and the others, which are sums of these and of columns that are free anyway, are
+/// left out. A direction for a column that has none of its own would be that of a parameter.
+fn without_some(factor: Mat<f64>, columns: Range<usize>, kept: &[usize]) -> Mat<f64> {
+    if columns.is_empty() {
         return factor;
     }
-    let place = |j: usize| match j {
-        j if j < count => first + j,
-        j if j < first + count => j - count,
-        j => j,
-    };
-    let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
+    let rest = (0..factor.ncols()).filter(|j| !columns.contains(j));
+    let order: Vec<usize> = kept.iter().copied().chain(rest).collect();
+    let factor = compressed(&Mat::from_fn(factor.nrows(), order.len(), |i, j| factor[(i, order[j])]));
+    let count = kept.len();
     let rows = factor.nrows().saturating_sub(count);
     factor.submatrix(count, count, rows, factor.ncols() - count).to_owned()
+}
+
+/// Part of a column beyond those before it, over its length, from which it is one of its own.
+const INDEPENDENT: f64 = 1e-6;
+
+/// The columns of a range that are no sums of the first ones and of those before them: two inputs whose noise one output sees have an end in common.
+fn independent(factor: &Mat<f64>, first: usize, columns: Range<usize>) -> Vec<usize> {
+    let mut found: Vec<Col<f64>> = Vec::new();
+    let mut is_new = |j: usize| {
+        let mut rest = factor.col(j).to_owned();
+        let length = rest.norm_l2();
+        for v in found.iter().chain(&found) {
+            let along = v.transpose() * &rest;
+            rest -= Scale(along) * v;
+        }
+        let beyond = rest.norm_l2();
+        let new = beyond > INDEPENDENT * length;
+        if new {
+            found.push(Scale(1.0 / beyond) * rest);
+        }
+        new
+    };
+    (0..first).chain(columns.clone()).filter(|j| is_new(*j) && columns.contains(j)).collect()
 }
 
 pub(crate) fn stacked(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
@@ -163,12 +190,15 @@ pub(crate) fn compressed(rows: &Mat<f64>) -> Mat<f64> {
 fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
     let (count, last) = (place.lines.z.len(), columns(&place) - 1);
     let own = last - place.ends_of_colours()..last;
-    if !quick {
-        return without(orthogonal(place, count), own);
-    }
-    let grams: Vec<Mat<f64>> = parts(count).map(|range| gram(place, range)).collect();
-    let columns = columns(&place);
-    without(root_of(&grams.iter().fold(Mat::zeros(columns, columns), |sum, gram| sum + gram)), own)
+    let factor = match quick {
+        false => orthogonal(place, count),
+        true => {
+            let grams: Vec<Mat<f64>> = parts(count).map(|range| gram(place, range)).collect();
+            root_of(&grams.iter().fold(Mat::zeros(last + 1, last + 1), |sum, gram| sum + gram))
+        }
+    };
+    let kept = independent(&factor, place.model.end_count(), own.clone());
+    without_some(factor, own, &kept)
 }
 
 fn columns(place: &Place<'_>) -> usize {

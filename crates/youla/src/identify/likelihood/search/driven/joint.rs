@@ -175,6 +175,8 @@ impl Joint {
                 }
             }
         }
+        // Of several ends that drive the same, the smallest.
+        (0..m).for_each(|a| gram[(a, a)] *= 1.0 + 1e-10);
         let Ok(factor) = gram.llt(Side::Lower) else { return vec![0.0; m] };
         factor.solve(&cross).col(0).iter().copied().collect()
     }

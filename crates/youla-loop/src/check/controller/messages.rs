@@ -193,5 +193,6 @@ impl ControllerCheck {
 pub(in crate::check) fn not_simulated(record: &str, error: &Error) -> Finding {
     let what = format!("the declared controller cannot be compared with the logged input: {error}");
     Finding::new(Test::Controller, Severity::Note, record, what)
-        .advice("`youla identify` checks it through the coprime factors (controller_mismatch)")
+        .advice("`youla identify` compares it with the log without simulating it (test of the controller). A pole next to 1 in place of an integrator \
+             is the rounding of its coefficients: state more digits, or [controller.state_space]")
 }

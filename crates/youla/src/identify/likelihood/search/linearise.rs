@@ -137,7 +137,7 @@ pub(crate) const MOST_COEFFICIENTS: usize = 100;
 
 /// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N.
 pub(crate) fn without(factor: Mat<f64>, columns: Range<usize>) -> Mat<f64> {
-    let kept: Vec<usize> = columns.clone().collect();
+    let kept = independent(&factor, 0, columns.clone());
     without_some(factor, columns, &kept)
 }
 
@@ -158,7 +158,8 @@ fn without_some(factor: Mat<f64>, columns: Range<usize>, kept: &[usize]) -> Mat<
 /// Part of a column beyond those before it, over its length, from which it is one of its own.
 const INDEPENDENT: f64 = 1e-6;
 
-/// The columns of a range that are no sums of the first ones and of those before them: two inputs whose noise one output sees have an end in common.
+/// The columns of a range that are no sums of the first ones and of those before them: two inputs whose noise one output sees have an end in common,
+/// and where they drive one state, a variance.
 fn independent(factor: &Mat<f64>, first: usize, columns: Range<usize>) -> Vec<usize> {
     let mut found: Vec<Col<f64>> = Vec::new();
     let mut is_new = |j: usize| {

@@ -308,20 +308,16 @@ fn step_remedy(dt: f64) -> &'static str {
 }
 
 /// Lines up to which those before one with other fields may be notes above the names.
-const LONGEST_NOTES: usize = 20;
+const LONGEST_NOTES: usize = 6;
 
 /// The setting that passes over the lines that are no data: notes above the names, or the line itself.
 fn lines_to_skip(line: usize) -> String {
-    let itself = format!("for a line that is no row, as the last one of a log that was cut, --skip-lines {line}");
-    let notes: Vec<String> = (1..line).map(|k| k.to_string()).collect();
-    match (2..=LONGEST_NOTES).contains(&line) {
-        true => format!(
-            "for notes above the names --skip-lines {} (csv = {{ skip_lines = [{}] }} in [data]), {itself}",
-            notes.join(","),
-            notes.join(", ")
-        ),
-        false => format!("{itself} (csv = {{ skip_lines = [{line}] }} in [data])"),
+    let itself = format!("a line that is no row, as the last one of a log that was cut, by --skip-lines {line}");
+    if !(2..=LONGEST_NOTES).contains(&line) {
+        return format!("pass over {itself} (skip_lines in [data] csv)");
     }
+    let notes: Vec<String> = (1..line).map(|k| k.to_string()).collect();
+    format!("pass over notes above the names by --skip-lines {} (skip_lines in [data] csv), {itself}", notes.join(","))
 }
 
 /// The setting that makes a cell with the other decimal sign a number.

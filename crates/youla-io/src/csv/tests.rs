@@ -54,11 +54,11 @@ fn errors_say_where() {
         ("a,b\n1,2,3\n", "line 2: 3 fields"),
         (
             "Rig no b\nBy: X\na,b\n1,2\n",
-            "for notes above the names --skip-lines 1 (csv = { skip_lines = [1] } in [data])",
+            "pass over notes above the names by --skip-lines 1 (skip_lines in [data] csv), a line that",
         ),
         (
             cut.as_str(),
-            "line 32: 1 fields, but the first line has 2; for a line that is no row, as the last one of a log that was cut, --skip-lines 32",
+            "line 32: 1 fields, but the first line has 2; pass over a line that is no row, as the last one of a log that was cut, by --skip-lines 32",
         ),
         ("a,b\n", "there is no line with data"),
         ("# only\n", "there is no line with data"),

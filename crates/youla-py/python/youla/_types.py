@@ -1,7 +1,7 @@
 """What passes between the package and the extension module."""
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,8 @@ Table: TypeAlias = tuple[Array, npt.NDArray[np.complex128], Array | None, bool, 
 #: A, B, C, D and the sample time.
 Matrices: TypeAlias = tuple[Array, Array, Array, Array, float]
 
-#: Sign of the feedback: u = K (r - y), or u = K (y - r).
-Feedback: TypeAlias = Literal["negative", "positive"]
+#: Sign of the feedback: u = K (r - y), or u = K (y - r). Unions, as stubtest takes a Literal of two for another thing than it is at run time.
+Feedback: TypeAlias = Union[Literal["negative"], Literal["positive"]]
 
 #: How a controller in s was brought to the sample time.
-Hold: TypeAlias = Literal["zoh", "tustin"]
+Hold: TypeAlias = Union[Literal["zoh"], Literal["tustin"]]

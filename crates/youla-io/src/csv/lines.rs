@@ -137,7 +137,7 @@ impl Lines {
                 self.line.drain(..3);
             }
             let text = self.line.trim_ascii();
-            // The first line `sep=;` tells a spreadsheet the delimiter that the names have.
+            // A first line `sep=;` states the delimiter to spreadsheets; the line of names has it too.
             let of_spreadsheet = || (self.number == 1 && text.len() == 5).then(|| text.strip_prefix(b"sep=")).flatten();
             let note = text.strip_prefix(b"#").or_else(|| text.strip_prefix(b"%")).or_else(of_spreadsheet);
             if note.is_none() && !text.is_empty() && !self.skip.contains(&self.number) {

@@ -2,8 +2,8 @@
 
 use super::{StateSpace, TimeDomain};
 use crate::Result;
-use crate::linalg::TINY;
-use faer::{Col, Mat, MatRef};
+use crate::linalg::{Orthonormal, TINY};
+use faer::{Col, Mat, MatRef, Scale};
 
 /// Part of a direction beyond those before it, over the norm of A, from which it is one. Realisations of polynomials with 16 digits leave 1e-14
 /// of a state that their response lacks; an integrator whose time is a million samples has 1e-6.
@@ -42,27 +42,21 @@ impl<T: TimeDomain> StateSpace<T> {
     }
 }
 
-/// Orthonormal columns that span those of `[B A B A^2 B ...]` (block Arnoldi, each column orthogonalised twice).
+/// Orthonormal columns that span those of `[B A B A^2 B ...]` (block Arnoldi).
 fn basis(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let (n, norm) = (a.nrows(), a.norm_l2().max(TINY));
-    let mut found: Vec<Col<f64>> = Vec::new();
-    let mut next: Vec<Col<f64>> =
-        b.col_iter().map(|c| faer::Scale(1.0 / c.norm_l2().max(TINY)) * c.to_owned()).collect();
-    while !next.is_empty() && found.len() < n {
-        let first = found.len();
-        for mut w in next {
-            for v in found.iter().chain(&found) {
-                let along = v.transpose() * &w;
-                w -= faer::Scale(along) * v;
-            }
-            let beyond = w.norm_l2();
-            if beyond > REACHED && found.len() < n {
-                found.push(faer::Scale(1.0 / beyond) * w);
+    let mut found = Orthonormal::default();
+    let mut next: Vec<Col<f64>> = b.col_iter().map(|c| Scale(1.0 / c.norm_l2().max(TINY)) * c.to_owned()).collect();
+    while !next.is_empty() {
+        let first = found.columns().len();
+        for column in next {
+            if found.columns().len() < n {
+                found.add(column, REACHED);
             }
         }
-        next = found[first..].iter().map(|v| faer::Scale(1.0 / norm) * (a * v)).collect();
+        next = found.columns()[first..].iter().map(|v| Scale(1.0 / norm) * (a * v)).collect();
     }
-    Mat::from_fn(n, found.len(), |i, j| found[j][i])
+    Mat::from_fn(n, found.columns().len(), |i, j| found.columns()[j][i])
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ fn record(plant: &StateSpace<Discrete>, seed: u64) -> (Mat<f64>, Mat<f64>) {
     (u, y)
 }
 
-/// Of three inputs that drive one state neither the ends of the colours nor the variances are told from each other.
+/// Of three inputs that drive one state neither the ends of the colours nor the variances can be distinguished.
 #[test]
 fn the_deviation_of_one_state_with_three_inputs_is_stated() {
     let time = Discrete::new(1.0).unwrap();

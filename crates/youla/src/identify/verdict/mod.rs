@@ -42,7 +42,7 @@ use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::response_error::ResponseError;
 use crate::identify::likelihood::deviation::{Directions, grid};
-use crate::identify::likelihood::{Evidence, LoopKnowledge, TestOutcome, figure as figure_of};
+use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
@@ -271,14 +271,14 @@ fn stability(
     }
     let deviation = region.intervals(0.95, radius)?[0].deviation;
     let size = format!("its standard deviation is {deviation:.1e}");
-    // Neither the estimate nor growth in the records tells it from one inside: two integrators of a law whose coefficients were rounded split by less.
+    // Neither the estimate nor growth in the records distinguishes it from one inside: two integrators of a law whose coefficients were rounded split by less.
     let growth = largest.ln() * samples as f64;
     let shown = growth > GROWTH || growth > NO_GROWTH && largest - 1.0 > deviation;
     if shown {
         return Ok(Some(evidence.noted(size)));
     }
-    let note = format!("{size}: the records do not tell it from a pole inside of the unit circle");
-    Ok(Some(Evidence { outcome: TestOutcome::Passed, ..evidence.noted(note) }))
+    let note = format!("{size}: the records do not distinguish it from a pole inside of the unit circle");
+    Ok(Some(evidence.by_chance(note)))
 }
 
 /// The difference between the responses that the excitation shows in groups of records, in the loop, largest over frequency.

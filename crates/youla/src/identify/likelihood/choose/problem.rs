@@ -218,10 +218,13 @@ impl Problem<'_> {
     /// not move is that of the statement of the controller, as rounding of a polynomial with an integrator leaves it.
     pub(super) fn unstable_poles(&self, choice: &Choice) -> Vec<(c64, f64)> {
         let least = GROWTH / self.samples().0 as f64;
+        let outside = self.poles_outside(choice);
+        if outside.is_empty() {
+            return outside;
+        }
         let of_controller = self.feedback.and_then(|k| k.poles().ok()).unwrap_or_default();
         let moved = |z: &c64, apart: f64| apart > least && of_controller.iter().all(|pole| (pole - z).norm() > least);
-        let outside = self.poles_outside(choice).into_iter();
-        outside.filter(|(z, apart)| z.norm().ln() > least || moved(z, *apart)).collect()
+        outside.into_iter().filter(|(z, apart)| z.norm().ln() > least || moved(z, *apart)).collect()
     }
 
     /// The same with those on the circle that the feedback does not move.

@@ -7,7 +7,7 @@
 //! for what the excitation shows beyond both. Figures that depend on the response at one frequency take the directions
 //! there; figures of the poles take the directions of the parameters.
 
-use super::response_error::{EntryErrors, ResponseError};
+use super::response_error::{EntryErrors, ResponseError, root_of};
 use super::{Directions, Parts, physical};
 use crate::control::ChannelScales;
 use crate::identify::likelihood::data::spectra::Sizes;
@@ -109,9 +109,7 @@ impl Region {
     /// Stated at frequencies that are shares of the sample rate.
     pub(crate) fn new(sizes: Sizes, time: Discrete, shares: &[f64], directions: Directions) -> Self {
         let (m, p) = (sizes.u.len(), sizes.y.len());
-        // What is not known is unbounded, not zero.
-        let size = |square: f64| if square.is_nan() { f64::INFINITY } else { square.max(0.0).sqrt() };
-        let of = |v: &[f64]| Mat::from_fn(p, m, |i, j| size(v[i * m + j]) * sizes.y[i] / sizes.u[j]);
+        let of = |v: &[f64]| Mat::from_fn(p, m, |i, j| root_of(v[i * m + j]) * sizes.y[i] / sizes.u[j]);
         let hz = shares.iter().map(|share| share / time.ts()).collect();
         let parts: Vec<Parts> = shares.par_iter().map(|share| directions.parts(*share)).collect();
         let all = |pick: fn(&Parts) -> &[f64]| parts.iter().map(|p| of(pick(p))).collect();

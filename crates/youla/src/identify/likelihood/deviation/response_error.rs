@@ -208,8 +208,13 @@ impl EntryErrors {
     pub fn of_magnitude(&self, g: c64, port: (usize, usize)) -> f64 {
         let (re, im) = if g.norm() > 0.0 { (g.re / g.norm(), g.im / g.norm()) } else { (1.0, 0.0) };
         let [rr, ri, ii] = self.covariance(port);
-        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
+        root_of(re * re * rr + 2.0 * re * im * ri + im * im * ii)
     }
+}
+
+/// Root of a mean square, zero for rounding below zero. What is not known is unbounded, not zero.
+pub(super) fn root_of(square: f64) -> f64 {
+    if square.is_nan() { f64::INFINITY } else { square.max(0.0).sqrt() }
 }
 
 #[cfg(test)]

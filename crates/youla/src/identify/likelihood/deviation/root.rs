@@ -50,7 +50,7 @@ impl Root {
             let extra = Extra { count, values, quick: false, filter: Filter::Free };
             let factor = linearise_with(spectra, point, chart, noise, &extra).factor;
             let parameters = chart.parameters();
-            return Root::dense(inverse_root(&without(factor, parameters..parameters + count), parameters));
+            return Root::dense(inverse_root(&without(factor, 0, parameters..parameters + count), parameters));
         }
         let normal = Normal::new(spectra, point, chart, noise, Ends::Shared).reduced();
         Root::of_arrow(&normal.factor(0.0), chart, &point.model)

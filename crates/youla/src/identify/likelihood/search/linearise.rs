@@ -15,9 +15,9 @@ use super::residual::residual;
 use super::rows::{Place, Rows};
 use crate::identify::likelihood::data::lanes::LANES;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
-use crate::linalg::TINY;
+use crate::linalg::{Orthonormal, TINY};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Col, Mat, Par, Scale, c64};
+use faer::{Accum, Mat, Par, c64};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -85,7 +85,7 @@ pub(crate) fn linearise_with(
     extra: &Extra<'_>,
 ) -> Linearised {
     let (Linearised { factor, ends }, of_noise) = linearise_all(spectra, point, (chart, noise), extra);
-    Linearised { factor: without(factor, of_noise), ends }
+    Linearised { factor: without(factor, 0, of_noise), ends }
 }
 
 /// The same, and which columns are those of the coefficients of the noise.
@@ -135,18 +135,13 @@ fn linearise_all(
 /// Coefficients of the noise of all outputs that have columns at most: the work grows with the square of their number.
 pub(crate) const MOST_COEFFICIENTS: usize = 100;
 
-/// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N.
-pub(crate) fn without(factor: Mat<f64>, columns: Range<usize>) -> Mat<f64> {
-    let kept = independent(&factor, 0, columns.clone());
-    without_some(factor, columns, &kept)
-}
-
-/// The same of columns of which some suffice: those are free, and the others, which are sums of these and of columns that are free anyway, are
-/// left out. A direction for a column that has none of its own would be that of a parameter.
-fn without_some(factor: Mat<f64>, columns: Range<usize>, kept: &[usize]) -> Mat<f64> {
+/// The factor `[J N M r]` without its columns N, their coefficients free: that of `[N J M r]` below and behind N. Those of N that are sums of others and of
+/// the first `known` columns, which are free anyway, are left out: a direction for a column that has none of its own would be that of a parameter.
+pub(crate) fn without(factor: Mat<f64>, known: usize, columns: Range<usize>) -> Mat<f64> {
     if columns.is_empty() {
         return factor;
     }
+    let kept = independent(&factor, known, columns.clone());
     let rest = (0..factor.ncols()).filter(|j| !columns.contains(j));
     let order: Vec<usize> = kept.iter().copied().chain(rest).collect();
     let factor = compressed(&Mat::from_fn(factor.nrows(), order.len(), |i, j| factor[(i, order[j])]));
@@ -161,20 +156,11 @@ const INDEPENDENT: f64 = 1e-6;
 /// The columns of a range that are no sums of the first ones and of those before them: two inputs whose noise one output sees have an end in common,
 /// and where they drive one state, a variance.
 fn independent(factor: &Mat<f64>, first: usize, columns: Range<usize>) -> Vec<usize> {
-    let mut found: Vec<Col<f64>> = Vec::new();
+    let mut basis = Orthonormal::default();
     let mut is_new = |j: usize| {
-        let mut rest = factor.col(j).to_owned();
-        let length = rest.norm_l2();
-        for v in found.iter().chain(&found) {
-            let along = v.transpose() * &rest;
-            rest -= Scale(along) * v;
-        }
-        let beyond = rest.norm_l2();
-        let new = beyond > INDEPENDENT * length;
-        if new {
-            found.push(Scale(1.0 / beyond) * rest);
-        }
-        new
+        let column = factor.col(j).to_owned();
+        let least = INDEPENDENT * column.norm_l2();
+        basis.add(column, least)
     };
     (0..first).chain(columns.clone()).filter(|j| is_new(*j) && columns.contains(j)).collect()
 }
@@ -198,8 +184,7 @@ fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
             root_of(&grams.iter().fold(Mat::zeros(last + 1, last + 1), |sum, gram| sum + gram))
         }
     };
-    let kept = independent(&factor, place.model.end_count(), own.clone());
-    without_some(factor, own, &kept)
+    without(factor, place.model.end_count(), own)
 }
 
 fn columns(place: &Place<'_>) -> usize {

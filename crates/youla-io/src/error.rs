@@ -192,7 +192,7 @@ pub enum Error {
     /// The steps of the time column are not uniform.
     #[error(
         "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s; {}",
-        Seconds(*dt), Seconds(*ts), step_remedy(*dt)
+        Seconds(*dt), Seconds(*ts), step_remedy(*dt, *ts)
     )]
     NonUniformTime {
         /// The record or file.
@@ -299,8 +299,11 @@ fn position(at: Option<TextPosition>) -> String {
 }
 
 /// What to do about a step of the time column.
-fn step_remedy(dt: f64) -> &'static str {
-    if dt > 0.0 {
+fn step_remedy(dt: f64, ts: f64) -> &'static str {
+    if (dt - ts).abs() < 0.5 * ts {
+        "no row is lost, the stamps vary: state the sample time in place of the time column where the machine keeps it (sample_time in [data], \
+         --sample-time), or bring the log to one clock by `youla synchronise`"
+    } else if dt > 0.0 {
         "gaps = \"split\" in [data] cuts the record there, `segments` of the file choose rows"
     } else {
         "remove the rows that were logged twice, and sort the others"

@@ -66,8 +66,9 @@ pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
         first += stretch.len();
     }
     let [(samples, first), (next, _), ..] = longest;
-    // Before it first moves a machine is at rest.
-    let rests = first == 0 && samples < AT_REST;
+    // Before it first moves a machine is at rest, and its command is the excitation.
+    let leading: usize = values.chunk_by(|a, b| a == b).take_while(|s| s.len() > 1).map(<[f64]>::len).sum();
+    let rests = first < leading && first + samples < AT_REST;
     if rests || samples < SHORTEST || samples == values.len() || samples as f64 <= options.stuck_ratio * next as f64 {
         return None;
     }
@@ -162,6 +163,18 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
+
+    /// A command at the start of a record: the excitation alone, of two levels, until a coarse encoder shows its first count.
+    #[test]
+    fn a_command_is_the_excitation_before_the_first_count() {
+        let moving = (0..500).map(|k| (0.3 * f64::from(k)).sin());
+        let start = [vec![-1.0; 4], vec![1.0; 13]].concat();
+        let options = CheckOptions::default();
+        let record: Vec<f64> = start.iter().copied().chain(moving.clone()).collect();
+        assert_eq!(stuck(&record, &options), None);
+        let later: Vec<f64> = moving.clone().chain(start).chain(moving).collect();
+        assert_eq!(stuck(&later, &options).unwrap().samples, 13);
+    }
 
     /// A heater of 32 steps that rests at set points, and the same stuck once for as long as the longest.
     #[test]

@@ -369,7 +369,9 @@ fn predicted_intervals(
     let response = disturbance_response(plant, k)?.in_units(problem.input_size, problem.output_size);
     let followed = followed_damping(&loop_modes(&response)?);
     let damping = |plant: &StateSpace<Discrete>| Ok(vec![followed(&disturbance_response(plant, k)?)?]);
-    let least_damping = region.intervals(level, damping)?.first().copied();
+    // Damping ratios are of that size; where two poles meet, the slope of theirs has no bound.
+    let possible = |i: &Interval| Interval { bounds: i.bounds.map(|bound| bound.clamp(-1.0, 1.0)), ..*i };
+    let least_damping = region.intervals(level, damping)?.first().map(possible);
     let scales = ChannelScales::new(problem.input_size.to_vec(), problem.output_size.to_vec())?;
     let margins = margin_intervals(&margins(plant, k)?, plant, k, region, Some(&scales), level)?;
     Ok(PredictedIntervals { least_damping, margins })

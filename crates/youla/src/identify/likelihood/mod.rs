@@ -32,6 +32,8 @@ mod noise_at_inputs;
 #[cfg(test)]
 mod noise_by_own_path;
 mod options;
+#[cfg(test)]
+mod random_walk_loads;
 mod recommendation;
 pub(super) mod search;
 #[cfg(test)]

@@ -354,7 +354,7 @@ fn the_predictor_after_a_search_has_the_filter_of_its_noise() {
         radius: f64::INFINITY,
         filter_moves: true,
     };
-    let found = search(&spectra, start, &options).unwrap();
+    let found = search(&spectra, start, None, &options).unwrap();
     assert!(found.steps > 0 && found.noise.enters_at_inputs());
     let (a, b, c) = found.point.model.matrices();
     let stated = predictor(&StateSpace::new(a, b, c, Mat::zeros(1, 1), plant.time()).unwrap(), &found.noise, &[1.0]);

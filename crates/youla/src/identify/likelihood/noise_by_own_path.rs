@@ -4,7 +4,7 @@ use super::noise_at_inputs::{unscaled, whitener};
 use super::search::chart::Chart;
 use super::search::feedthrough::Answer;
 use super::search::free_gain::with_free_gain;
-use super::search::linearise::linearise_free;
+use super::search::linearise::{Filter, linearise_quickly};
 use super::search::model::Model;
 use super::search::noise::Noise;
 use super::search::{Found, SearchOptions, search, with_best_ends};
@@ -53,7 +53,7 @@ fn model() -> Model {
 }
 
 fn found(spectra: &Spectra) -> Found {
-    search(spectra, with_best_ends(spectra, model(), &Noise::white(1)), &options(40)).unwrap()
+    search(spectra, with_best_ends(spectra, model(), &Noise::white(1)), None, &options(40)).unwrap()
 }
 
 /// Along a parameter of the plant and an entry of K, `J' r` is minus the slope of half the deviance by central differences, within 3 %: these
@@ -70,7 +70,7 @@ fn slopes_are_those_of_the_deviance() {
     };
     let (_, point, noise) = at(&model(), &gain);
     let chart = Chart::new(&point.model, false);
-    let factor = linearise_free(&spectra, &point, &chart, &noise).factor;
+    let factor = linearise_quickly(&spectra, &point, (&chart, &noise), Filter::Free).factor;
     // Between them are columns of the autoregression.
     let (count, columns) = (chart.parameters(), factor.ncols());
     let first = columns - 1 - gain.nrows();

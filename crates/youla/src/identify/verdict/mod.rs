@@ -15,6 +15,7 @@
 //!
 //! A model is trusted where every required test is passed. Limits: `limits`.
 
+mod beyond;
 mod controller;
 mod excess;
 mod functions;
@@ -124,10 +125,12 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     }
     let confirmed = confirmed(on)?;
     let shown = of_region(on.plant, on.region, loops.as_ref(), &|share, i, j| confirmed(share, i, j))?;
+    let (p, m, sizes) = (on.plant.outputs(), on.plant.inputs(), &on.problem.sizes.y);
+    let all_shown = |hz: f64| (0..p).all(|i| (0..m).all(|j| confirmed(hz * ts, i, j)));
+    let unseen = loops.as_ref().and_then(|loops| beyond::beyond(loops, all_shown, sizes));
     let information = on.witness.zip(loops.as_ref()).map(|(witness, loops)| information(on, witness, loops));
     let informed = information.as_ref().is_none_or(Evidence::holds);
     evidence.extend(information);
-    let sizes = &on.problem.sizes.y;
     let sensitivity = |share: f64| {
         let at = loops.as_ref()?.near(share / ts)?;
         Some(Mat::from_fn(sizes.len(), sizes.len(), |i, j| at.s[(i, j)] * (sizes[j] / sizes[i])))
@@ -138,6 +141,7 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
         evidence.push(repeatability(on, witness, &weigh));
     }
     evidence.push(shown.0);
+    evidence.extend(unseen);
     evidence.extend(on.nonlinear.clone());
     Ok(Judgement { evidence, informed, ..shown.1 })
 }

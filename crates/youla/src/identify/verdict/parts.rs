@@ -288,6 +288,6 @@ fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) ->
     let problem = problem.with_feedthrough(choice.found.feedthrough);
     let options = problem.options(STEPS, 1.0, &choice.delays);
     let of_gain = with_gain_of(&choice.found, &spectra, &start, &options);
-    let found = of_gain.or_else(|| search(&spectra, start, &options))?;
+    let found = of_gain.or_else(|| search(&spectra, start, Some(&choice.found.noise), &options))?;
     Some(found.point.model)
 }

@@ -153,7 +153,7 @@ fn less_lines(
         let start = |model| with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
         // A search would move the modes in question to whatever else is there.
         let still = problem.options(0, f64::INFINITY, delays);
-        let whole = search(&spectra, start(narrow.model.clone()), &still)?.criterion(spectra.samples());
+        let whole = search(&spectra, start(narrow.model.clone()), None, &still)?.criterion(spectra.samples());
         let (less, origin) = (start(narrow.model.without(&narrow.places)), "without a line".into());
         let task = Task { spectra: spectra.clone(), start: less, delays: delays.clone(), origin };
         let less = problem.run(vec![task], f64::INFINITY, table);

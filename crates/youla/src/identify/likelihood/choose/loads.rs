@@ -150,7 +150,9 @@ pub(super) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec
             return Some(next);
         }
     }
-    Some(Cleaned::untouched(all.solve_from(vec![now.solution.chosen], table)?))
+    let Solution { chosen, mut rivals, .. } = now.solution;
+    rivals.push(chosen);
+    Some(Cleaned::untouched(all.solve_from(rivals, table)?))
 }
 
 /// The model without the modes that the inputs hardly move; `None` where there are none or no others, and where the order is given.

@@ -260,7 +260,7 @@ impl Problem<'_> {
     /// Where a search on all lines ends.
     fn searched(&self, task: Task, aim: f64) -> Option<Choice> {
         let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
-        let found = search(&task.spectra, task.start, &options)?;
+        let found = search(&task.spectra, task.start, None, &options)?;
         Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
     }
 
@@ -268,7 +268,7 @@ impl Problem<'_> {
     fn searched_on_groups(&self, tasks: impl ParallelIterator<Item = Task>, aim: f64) -> Vec<Choice> {
         let reached = |task: Task| {
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
-            let Some(found) = on_groups(&task.spectra, &task.start, &options) else {
+            let Some(found) = on_groups(&task.spectra, &task.start, None, &options) else {
                 return Some((self.searched(task, aim)?, None));
             };
             let choice = self.choice(found, task.spectra.samples(), task.delays, task.origin);

@@ -111,7 +111,7 @@ impl Problem<'_> {
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
         let options = SearchOptions { filter_moves: true, ..last.options(40, CONVERGED, &chosen.delays) };
-        if let Some(found) = search(&spectra, chosen.found.point.clone(), &options) {
+        if let Some(found) = search(&spectra, chosen.found.point.clone(), Some(&chosen.found.noise), &options) {
             let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
             if last.stabilised() || !chosen.stabilised() {
                 chosen = last;
@@ -273,7 +273,7 @@ impl Problem<'_> {
         let whole = self.with_feedthrough(chosen.found.feedthrough);
         let options = whole.options(15, 0.3, &chosen.delays);
         let start = with_best_ends(&spectra, chosen.found.point.model, &chosen.found.noise);
-        let found = search(&spectra, start, &options)?;
+        let found = search(&spectra, start, Some(&chosen.found.noise), &options)?;
         Some(self.choice(found, spectra.samples(), chosen.delays, "first part of the records".into()))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::noise::Noise;
 use super::point::{Point, reblocked};
-use super::{SearchOptions, cost, with_best_ends, with_best_inputs};
+use super::{SearchOptions, cost, cost_beside, with_best_ends, with_best_inputs};
 use crate::identify::likelihood::data::spectra::Spectra;
 
 /// Times that the ends of a start and the filter of its noise are taken from each other: the third changes little.
@@ -11,9 +11,14 @@ const SETTLED: usize = 3;
 const LONG: usize = 3;
 
 /// Where a search begins, its value and the noise there; `None` where that is not finite.
-pub(super) fn begun(spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<(Point, f64, Noise)> {
+pub(super) fn begun(
+    spectra: &Spectra,
+    start: &Point,
+    known: Option<&Noise>,
+    options: &SearchOptions,
+) -> Option<(Point, f64, Noise)> {
     let mut point = reblocked(start)?;
-    let (mut least, mut noise) = cost(spectra, &point, options);
+    let (mut least, mut noise) = cost_beside(spectra, &point, known, options);
     if !least.is_finite() {
         return None;
     }
@@ -29,7 +34,7 @@ pub(super) fn begun(spectra: &Spectra, start: &Point, options: &SearchOptions) -
             break;
         }
         let trial = with_best_ends(spectra, point.model.clone(), &noise);
-        let (value, settled) = cost(spectra, &trial, options);
+        let (value, settled) = cost_beside(spectra, &trial, Some(&noise), options);
         let gain = least - value;
         if gain.is_nan() || gain < options.tolerance {
             break;

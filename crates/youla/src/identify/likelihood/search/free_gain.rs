@@ -9,9 +9,9 @@
 
 use super::block::Block;
 use super::chart::Chart;
-use super::driven::{Joint, LINES, Responses, hidden, longest, places_of, states_of};
+use super::driven::{Joint, LARGEST_POLE, LINES, Responses, hidden, longest, places_of, states_of};
 use super::groups::grouped;
-use super::linearise::{Linearised, MOST_COEFFICIENTS, linearise_free};
+use super::linearise::{Filter, Linearised, MOST_COEFFICIENTS, linearise_quickly};
 use super::model::Model;
 use super::noise::Noise;
 use super::point::Point;
@@ -27,8 +27,6 @@ use std::sync::Arc;
 
 /// Entries of K at most.
 const MOST: usize = 40;
-/// Pole of a colour at most: beyond it is a random walk.
-const LARGEST_POLE: f64 = 1.0 - 1e-5;
 /// Ridge of a start, relative to its diagonal.
 const RIDGE: f64 = 1e-9;
 
@@ -176,7 +174,7 @@ impl Search<'_> {
     fn step(&self, at: &At, damping: &mut Damping) -> Option<At> {
         let options = self.options;
         let chart = Chart::new(&at.point.model, options.feedthrough);
-        let Linearised { factor, ends } = linearise_free(self.spectra, &at.point, &chart, &at.noise);
+        let Linearised { factor, ends } = linearise_quickly(self.spectra, &at.point, (&chart, &at.noise), Filter::Free);
         let slope = super::slope(self.spectra, &at.point, (&chart, &at.noise), (options, true));
         let factor = with_slope(factor, &slope);
         let (gain, colour) = &at.gains;

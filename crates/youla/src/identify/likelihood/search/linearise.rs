@@ -61,19 +61,14 @@ pub(crate) fn linearise(spectra: &Spectra, point: &Point, chart: &Chart, noise: 
     linearise_with(spectra, point, chart, noise, &extra)
 }
 
-/// The same by normal equations, for a step of a search.
+/// The same by normal equations, for a step of a search; where the coefficients of the noise are free, their columns are behind those of the parameters.
 pub(crate) fn linearise_quickly(
     spectra: &Spectra,
     point: &Point,
     (chart, noise): (&Chart, &Noise),
     filter: Filter,
 ) -> Linearised {
-    linearise_with(spectra, point, chart, noise, &Extra { count: 0, values: &[], quick: true, filter })
-}
-
-/// The same for a step of a search, with columns of the coefficients of the noise behind those of the parameters.
-pub(crate) fn linearise_free(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Linearised {
-    linearise_all(spectra, point, (chart, noise), &Extra { count: 0, values: &[], quick: true, filter: Filter::Free }).0
+    linearise_all(spectra, point, (chart, noise), &Extra { count: 0, values: &[], quick: true, filter }).0
 }
 
 /// The same with further columns behind those of the parameters.

@@ -12,6 +12,7 @@ mod begin;
 pub(crate) mod block;
 pub(crate) mod by_output;
 pub(crate) mod chart;
+mod cost;
 pub(crate) mod driven;
 pub(crate) mod driven_slope;
 pub(crate) mod feedthrough;
@@ -33,6 +34,8 @@ use crate::linalg::{Damping, LEAST_DAMPING, damped_step, decrease};
 use begin::begun;
 use by_output::{Ends, Normal};
 use chart::Chart;
+pub(crate) use cost::deviance;
+use cost::{cost, cost_beside, least_cost, value_of};
 use driven::has_line;
 use faer::Mat;
 use feedthrough::Answer;
@@ -80,7 +83,8 @@ pub(crate) const DAMPED: f64 = 0.4;
 const MISLED: f64 = 8.0;
 /// Steps on groups from which they are made anew: a start that moves less is near enough to them.
 const REGROUPED: usize = 2;
-/// Share of the gain that groups promise which all lines must show. Chosen: within it the slopes of groups are those of lines.
+/// Share of the gain that groups promise which all lines must show, and of that of a step which is enough to keep the noise that it brings. Chosen:
+/// within it the slopes are those of what is judged.
 const KEPT: f64 = 0.5;
 /// Steps that are left for all lines behind those on groups, at least: most searches take none or one there.
 const LAST: usize = 5;
@@ -121,16 +125,6 @@ fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
     samples.ln() * parameters as f64 + of_ends
 }
 
-/// -2 log likelihood and noise of a point; noise at the inputs is white.
-pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
-    let noise = Noise::fit(spectra, &point.residuals(spectra), (noise_order, false), &point.model);
-    (of_noise(spectra, &noise, &point.model), noise)
-}
-
-fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
-    spectra.samples() as f64 * noise.log_det + 2.0 * unstable::outside(spectra, &model.poles())
-}
-
 /// B, D and the ends of the records by least squares, A and C kept.
 pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
     let chart = Chart::inputs_only(&model, feedthrough);
@@ -145,30 +139,38 @@ pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> 
     Slopes::new(spectra, &point, (&chart, noise), Vec::new(), Filter::Held).trial(&point, 0.0).0
 }
 
-/// Searches from a start, on many lines first on groups of them; `None` where nothing finite comes of it.
-pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
-    let Some(near) = on_groups(spectra, &start, options) else { return on_lines(spectra, start, options) };
+/// Searches from a start and the noise that is known near it, on many lines first on groups of them; `None` where nothing finite comes of it.
+pub(crate) fn search(spectra: &Spectra, start: Point, known: Option<&Noise>, options: &SearchOptions) -> Option<Found> {
+    let Some(near) = on_groups(spectra, &start, known, options) else {
+        return on_lines(spectra, start, known, options);
+    };
     let left = if near.given_up { 0 } else { (options.steps - near.steps).max(LAST) };
-    let found = on_lines(spectra, near.point, &SearchOptions { steps: left, ..options.clone() })?;
+    let last = SearchOptions { steps: left, ..options.clone() };
+    let found = on_lines(spectra, near.point, Some(&near.noise), &last)?;
     Some(Found { steps: near.steps + found.steps, given_up: near.given_up || found.given_up, ..found })
 }
 
 /// The same on groups of lines alone, which are made anew while the search moves, with deviance and noise of all lines; `None` also where there
 /// are no groups, and where all lines do not gain what groups promise: beside large and slow motion a small change of the model leaves more than
 /// the noise.
-pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<Found> {
+pub(crate) fn on_groups(
+    spectra: &Spectra,
+    start: &Point,
+    known: Option<&Noise>,
+    options: &SearchOptions,
+) -> Option<Found> {
     let (mut reached, mut steps): (Option<Found>, usize) = (None, 0);
     let mut before = f64::INFINITY;
     while steps < options.steps {
-        let point = reached.as_ref().map_or(start, |found| &found.point);
+        let (point, known) = reached.as_ref().map_or((start, known), |found| (&found.point, Some(&found.noise)));
         let Some(groups) = grouped(spectra, point, DAMPED) else { break };
         if before.is_infinite() {
-            before = cost(spectra, point, options).0;
+            before = cost_beside(spectra, point, known, options).0;
         }
         let options = SearchOptions { steps: options.steps - steps, ..options.clone() };
-        let promised = cost(&groups, point, &options).0;
-        let found = on_lines(&groups, point.clone(), &options)?;
-        let (after, noise) = cost(spectra, &found.point, &options);
+        let promised = cost_beside(&groups, point, known, &options).0;
+        let found = on_lines(&groups, point.clone(), known, &options)?;
+        let (after, noise) = cost_beside(spectra, &found.point, Some(&found.noise), &options);
         if (before - after).is_nan() || before - after < KEPT * (promised - found.deviance) - options.tolerance {
             break;
         }
@@ -183,23 +185,9 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
     reached
 }
 
-/// What a search makes small, and the noise of the point.
-fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
-    // Autoregressions of single outputs do not describe the colour of what several see. That of one output does until the last search: with a
-    // colour, searches from long regressions of a two-tank level end 60 to 100 nats above the model that they find without it.
-    let coloured = options.filter_moves || spectra.outputs > 1;
-    let noise = Noise::fit(spectra, &point.residuals(spectra), (options.noise_order, coloured), &point.model);
-    (value_of(spectra, &noise, &point.model, options), noise)
-}
-
-/// -2 log likelihood of y given the excitation.
-fn value_of(spectra: &Spectra, noise: &Noise, model: &Model, options: &SearchOptions) -> f64 {
-    of_noise(spectra, noise, model) - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(model, &options.direct)
-}
-
 /// The same on lines as they are.
-fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
-    let (mut point, mut least, mut noise) = begun(spectra, &start, options)?;
+fn on_lines(spectra: &Spectra, start: Point, known: Option<&Noise>, options: &SearchOptions) -> Option<Found> {
+    let (mut point, mut least, mut noise) = begun(spectra, &start, known, options)?;
     let (mut damping, mut steps, mut given_up) = (Damping::new(FIRST_DAMPING), 0, false);
     let mut parameters = Chart::new(&point.model, options.feedthrough).parameters();
     let mut misled = false;
@@ -214,13 +202,14 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope, filter);
         let mut first_promise = None;
         let step = |damping| {
-            let (trial, promised) = slopes.trial(&point, damping);
+            let (trial, of_noise, promised) = slopes.trial(&point, damping);
             first_promise.get_or_insert(promised);
-            (trial, promised)
+            ((trial, of_noise, promised), promised)
         };
-        let lower = damping.descend_sparingly(options.tolerance, step, |trial| {
+        let lower = damping.descend_sparingly(options.tolerance, step, |(trial, of_noise, promised)| {
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
-            let (value, noise) = cost(spectra, &trial, options);
+            let moved = noise.entry().map(|entry| entry.moved(&of_noise));
+            let (value, noise) = least_cost(spectra, &trial, (moved, least - KEPT * promised), options);
             let usable = value.is_finite() && (options.radius.is_infinite() || inside());
             usable.then_some(((trial, value, noise), least - value))
         });
@@ -247,7 +236,7 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
     }
     // The gain of noise at the inputs belongs to the coordinates of its model, which are others after `reblocked`.
     if steps > 0 && noise.enters_at_inputs() {
-        noise = cost(spectra, &point, options).1;
+        (least, noise) = cost_beside(spectra, &point, Some(&noise), options);
     }
     Some(Found { point, noise, deviance: least, parameters, steps, given_up, feedthrough: options.feedthrough })
 }
@@ -275,20 +264,20 @@ impl<'a> Slopes<'a> {
         Slopes::Dense(chart, Linearised { factor: with_slope(factor, &slope), ends })
     }
 
-    /// The point after a damped step, and the decrease of the deviance that it promises.
-    fn trial(&self, point: &Point, damping: f64) -> (Point, f64) {
+    /// The point after a damped step, the step of what is free of the noise, and the decrease of the deviance that they promise.
+    fn trial(&self, point: &Point, damping: f64) -> (Point, Vec<f64>, f64) {
         match self {
             Slopes::Dense(chart, Linearised { factor, ends }) => {
-                let count = chart.parameters();
+                let count = factor.ncols() - 1;
                 let (step, promised) = if count == 0 { (Vec::new(), 0.0) } else { damped(factor, count, damping) };
-                (moved(point, chart, ends, &step), promised)
+                (moved(point, chart, ends, &step), step[chart.parameters()..].to_vec(), promised)
             }
             Slopes::ByOutput(chart, normal) => {
                 let (step, changes, promised) = normal.step(damping);
                 let mut ends = point.ends.clone();
                 let all = ends.iter_mut().flatten().zip(changes.iter().flatten());
                 all.for_each(|(end, change)| *end += change);
-                (Point { model: chart.moved(&point.model, &step), ends }, promised)
+                (Point { model: chart.moved(&point.model, &step), ends }, Vec::new(), promised)
             }
         }
     }

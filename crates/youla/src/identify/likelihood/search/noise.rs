@@ -10,7 +10,7 @@
 
 use super::autoregression::{Binned, Correlations, Regression};
 use super::driven::joint::Filters;
-use super::driven::{Bins, Driven, Entry, Gains, Joint};
+use super::driven::{Bins, Driven, Entry, Gains, Joint, hidden, longest};
 use super::model::Model;
 use super::separable::separable;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
@@ -117,6 +117,22 @@ impl Noise {
             }
         }
         best
+    }
+
+    /// The same with variances and a colour that are known of noise at the inputs; `None` where it has no filter.
+    pub(crate) fn of_entry(
+        spectra: &Spectra,
+        residuals: &[Vec<c64>],
+        largest_order: usize,
+        model: &Model,
+        entry: Entry,
+    ) -> Option<Self> {
+        if model.blocks.is_empty() || !entry.free.is_empty() {
+            return None;
+        }
+        let hidden = hidden(model, longest(spectra), 0..spectra.outputs);
+        let joint = Arc::new(Joint::of_entry(model, &hidden, entry)?);
+        Some(Noise::behind(spectra, &joint.rest(spectra, residuals), largest_order, Some(joint)))
     }
 
     /// Noise at the inputs that up to seven outputs see together, also where autoregressions alone describe the residuals better.

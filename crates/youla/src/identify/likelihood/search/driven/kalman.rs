@@ -6,6 +6,11 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Scale, c64};
 use std::ops::Range;
 
+/// Largest change of the logarithm of a variance in a step.
+const LARGEST_CHANGE: f64 = 2.0;
+/// Pole of a colour at most: beyond it is a random walk.
+pub(crate) const LARGEST_POLE: f64 = 1.0 - 1e-5;
+
 /// Variances of the noise, up to a common factor, and the pole of that at the inputs where it has a colour.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
@@ -42,6 +47,22 @@ impl Entry {
         }
         let of_inputs = (0..m).map(|j| [unit(m, Some(j)), unit(p, None)]);
         of_inputs.chain((1..p).map(|i| [unit(m, None), unit(p, Some(i))])).collect()
+    }
+
+    /// After the last part of a step of the parameters of the model and of the noise: those of its directions and of the pole of the colour.
+    /// Variances stay positive, `v exp(change / v)`.
+    pub(crate) fn moved(&self, step: &[f64]) -> Self {
+        let mut moved = self.clone();
+        let Some(first) = step.len().checked_sub(self.parameters()) else { return moved };
+        let (directions, own) = (self.directions(), &step[first..]);
+        let along =
+            |which: usize, k: usize| directions.iter().zip(own).map(|(d, step)| d[which][k] * step).sum::<f64>();
+        let after = |v: f64, change: f64| v * (change / v).clamp(-LARGEST_CHANGE, LARGEST_CHANGE).exp();
+        moved.inputs.iter_mut().enumerate().for_each(|(j, v)| *v = after(*v, along(0, j)));
+        moved.sensors.iter_mut().enumerate().for_each(|(i, v)| *v = after(*v, along(1, i)));
+        let change = own.last().copied().unwrap_or(0.0);
+        moved.colour = self.colour.map(|pole| (pole + change).clamp(0.0, LARGEST_POLE));
+        moved
     }
 
     /// Number of its parameters.

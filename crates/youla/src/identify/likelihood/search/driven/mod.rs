@@ -22,7 +22,7 @@ mod sizes;
 use super::autoregression::Regression;
 pub(crate) use gains::{Gains, LINES, NARROW, Responses, has_line, hidden, is_line, longest};
 pub(crate) use joint::Joint;
-pub(crate) use kalman::{Entry, Kalman, places_of, states_of};
+pub(crate) use kalman::{Entry, Kalman, LARGEST_POLE, places_of, states_of};
 pub(crate) use sizes::Bins;
 
 use super::model::Model;

@@ -208,8 +208,12 @@ fn on_lines(spectra: &Spectra, start: Point, known: Option<&Noise>, options: &Se
         };
         let lower = damping.descend_sparingly(options.tolerance, step, |(trial, of_noise, promised)| {
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
-            let moved = noise.entry().map(|entry| entry.moved(&of_noise));
-            let (value, noise) = least_cost(spectra, &trial, (moved, least - KEPT * promised), options);
+            let (value, noise) = if moves {
+                let moved = noise.entry().map(|entry| entry.moved(&of_noise));
+                least_cost(spectra, &trial, (moved, least - KEPT * promised), options)
+            } else {
+                cost(spectra, &trial, options)
+            };
             let usable = value.is_finite() && (options.radius.is_infinite() || inside());
             usable.then_some(((trial, value, noise), least - value))
         });

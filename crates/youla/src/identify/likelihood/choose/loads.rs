@@ -150,7 +150,9 @@ pub(super) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec
             return Some(next);
         }
     }
+    // Rivals with other lags stay; those with other modes than the chosen one have some that stand for the same loads.
     let Solution { chosen, mut rivals, .. } = now.solution;
+    rivals.retain(|rival| rival.oscillating() == chosen.oscillating());
     rivals.push(chosen);
     Some(Cleaned::untouched(all.solve_from(rivals, table)?))
 }

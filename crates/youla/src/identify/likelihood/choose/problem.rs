@@ -62,6 +62,11 @@ impl Choice {
         self.criterion - credit_of_lags(&self.found.point.model, samples)
     }
 
+    /// States of oscillating modes.
+    pub(super) fn oscillating(&self) -> usize {
+        self.order() - lags(&self.found.point.model)
+    }
+
     /// States without those of the delays.
     pub(crate) fn order(&self) -> usize {
         self.found.point.model.order()
@@ -74,8 +79,12 @@ impl Choice {
 /// Akaike's to say. Of oscillating modes the best of all frequencies is tried, of which one always gains more than two per parameter: with
 /// Akaike's for all states 5 of 28 good models were refused for poles that are not there.
 pub(crate) fn credit_of_lags(model: &Model, samples: usize) -> f64 {
-    let lags = model.poles().iter().filter(|pole| pole.norm().ln().abs() >= pole.arg().abs()).count();
-    ((samples.max(2) as f64).ln() - 2.0) * ((model.inputs + model.outputs) * lags) as f64
+    ((samples.max(2) as f64).ln() - 2.0) * ((model.inputs + model.outputs) * lags(model)) as f64
+}
+
+/// States of lags.
+fn lags(model: &Model) -> usize {
+    model.poles().iter().filter(|pole| pole.norm().ln().abs() >= pole.arg().abs()).count()
 }
 
 /// The chosen model and those that the data do not tell from it.

@@ -49,6 +49,18 @@ pub(super) fn least_cost(
     }
 }
 
+/// The lesser of what was found and that with known noise at the inputs.
+pub(super) fn lesser(
+    spectra: &Spectra,
+    point: &Point,
+    known: Option<Entry>,
+    found: (f64, Noise),
+    options: &SearchOptions,
+) -> (f64, Noise) {
+    let near = known.and_then(|entry| cost_near(spectra, point, entry, options));
+    near.filter(|near| near.0 < found.0 || found.0.is_nan()).unwrap_or(found)
+}
+
 /// The same of a point with the noise of another.
 pub(super) fn cost_beside(
     spectra: &Spectra,

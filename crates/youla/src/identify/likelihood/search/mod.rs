@@ -35,7 +35,7 @@ use begin::begun;
 use by_output::{Ends, Normal};
 use chart::Chart;
 pub(crate) use cost::deviance;
-use cost::{cost, cost_beside, least_cost, value_of};
+use cost::{cost, cost_beside, least_cost, lesser, value_of};
 use driven::has_line;
 use faer::Mat;
 use feedthrough::Answer;
@@ -208,11 +208,13 @@ fn on_lines(spectra: &Spectra, start: Point, known: Option<&Noise>, options: &Se
         };
         let lower = damping.descend_sparingly(options.tolerance, step, |(trial, of_noise, promised)| {
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
+            let moved = noise.entry().map(|entry| entry.moved(&of_noise));
             let (value, noise) = if moves {
-                let moved = noise.entry().map(|entry| entry.moved(&of_noise));
                 least_cost(spectra, &trial, (moved, least - KEPT * promised), options)
             } else {
-                cost(spectra, &trial, options)
+                // The step of the sizes is not known.
+                let found = cost(spectra, &trial, options);
+                if found.0 < least { found } else { lesser(spectra, &trial, moved, found, options) }
             };
             let usable = value.is_finite() && (options.radius.is_infinite() || inside());
             usable.then_some(((trial, value, noise), least - value))

@@ -9,7 +9,7 @@ use crate::{Mat, MatRef, c64};
 /// The largest gain of the loop there, `sigma_max(G K (I - G K)^-1)`, with the frequency from which it counts; `None` where no frequency is shown, or
 /// none lies above. A factor of G beyond one over it makes the loop unstable at some phase, and a model continues what it has.
 ///
-/// `shown` says whether the excitation shows all entries at a frequency in Hz; `sizes` are those of the outputs.
+/// `shown` says whether the excitation shows what each input does at a frequency in Hz; `sizes` are those of the outputs.
 pub(super) fn beyond(loops: &Loops, shown: impl Fn(f64) -> bool, sizes: &[f64]) -> Option<Evidence> {
     let from = loops.at.iter().rposition(|at| shown(at.hz))?;
     let gain = |s: &Mat<c64>| largest_singular_value(of_loop(s, sizes).as_ref()).unwrap_or(0.0);

@@ -103,8 +103,8 @@ pub(crate) const INFORMATION_RATIO: f64 = 1.0;
 /// A part of the margin beyond which its size says nothing more.
 pub(crate) const NO_INFORMATION: f64 = 1e3;
 /// Gain of the closed loop above the frequencies that the excitation shows, from which a mode there is named as a danger: modes of machines rise by 20 dB
-/// above the response beside them. Of 20 simulated disc drives whose arm has a resonance there that the log does not show 17 exceed it, of 95 other
-/// trusted models 7.
+/// above the response beside them. Of 15 trusted models of simulated disc drives that lack the resonance of the arm, with an error above 0.3 in the loop,
+/// 12 exceed it, of 109 other trusted models 9.
 pub(crate) const LARGEST_UNSEEN_GAIN: f64 = 0.1;
 /// Amplitude of a line of a disturbance, over the size of the outputs, that is named as large.
 pub(crate) const LARGEST_LINE: f64 = 1.0;

@@ -126,8 +126,8 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     let confirmed = confirmed(on)?;
     let shown = of_region(on.plant, on.region, loops.as_ref(), &|share, i, j| confirmed(share, i, j))?;
     let (p, m, sizes) = (on.plant.outputs(), on.plant.inputs(), &on.problem.sizes.y);
-    let all_shown = |hz: f64| (0..p).all(|i| (0..m).all(|j| confirmed(hz * ts, i, j)));
-    let unseen = loops.as_ref().and_then(|loops| beyond::beyond(loops, all_shown, sizes));
+    let each_shown = |hz: f64| (0..m).all(|j| (0..p).any(|i| confirmed(hz * ts, i, j)));
+    let unseen = loops.as_ref().and_then(|loops| beyond::beyond(loops, each_shown, sizes));
     let information = on.witness.zip(loops.as_ref()).map(|(witness, loops)| information(on, witness, loops));
     let informed = information.as_ref().is_none_or(Evidence::holds);
     evidence.extend(information);

@@ -208,8 +208,9 @@ fn of_region(
             let question = "Part of the margin of the loop that the 95 % region takes, largest over frequency (region)";
             let seen = (0..p).all(|i| (0..m).all(|j| shown(r.largest_hz * ts, i, j)));
             let unseen = if seen { "" } else { ", where the excitation does not show the plant" };
-            let dominant = format!("mostly {} there{unseen}", dominant(region, r.largest_hz));
-            Evidence::new(question, r.largest, LARGEST_RATIO_OF_LOOP).at([r.largest_hz; 2]).noted(dominant)
+            let [dominant, meaning] = dominant(region, r.largest_hz);
+            let note = format!("mostly {dominant} there{unseen}{meaning}");
+            Evidence::new(question, r.largest, LARGEST_RATIO_OF_LOOP).at([r.largest_hz; 2]).noted(note)
         }
         None => {
             let relative = |k: usize| region.absolute[k].norm_l2() / g.at(k).norm_l2().max(TINY);
@@ -221,12 +222,19 @@ fn of_region(
     Ok((test, judgement))
 }
 
-/// The largest part of the region at a frequency.
-pub(crate) fn dominant(region: &Region, hz: f64) -> &'static str {
+/// The largest part of the region at a frequency, and what it is where its name does not say so.
+fn dominant(region: &Region, hz: f64) -> [&'static str; 2] {
     let k = region.hz.partition_point(|f| *f < hz).min(region.hz.len() - 1);
     let parts = region.parts.named();
     let largest = parts.iter().max_by(|a, b| a.1[k].norm_l2().total_cmp(&b.1[k].norm_l2()));
-    largest.map_or("noise", |part| part.0)
+    let name = largest.map_or("noise", |part| part.0);
+    let meaning = match name {
+        "choice" => " (models of another order or dead time that the records do not tell apart)",
+        "variation" => " (differences between records or parts of them)",
+        "distortion" => " (what the excitation causes and the model does not explain)",
+        _ => "",
+    };
+    [name, meaning]
 }
 
 /// Mean squares of entries in units of the channels as an error of the loop; relative to the response without a loop.

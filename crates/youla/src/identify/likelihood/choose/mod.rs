@@ -3,7 +3,7 @@
 pub(crate) mod dead_time;
 pub(crate) mod deadline;
 pub(crate) mod grow;
-mod line_fit;
+
 pub(crate) mod lines;
 pub(crate) mod loads;
 pub(crate) mod neighbours;

@@ -238,14 +238,17 @@ impl Problem<'_> {
 
     /// The same with those on the circle that the feedback does not move.
     pub(super) fn poles_outside(&self, choice: &Choice) -> Vec<(c64, f64)> {
-        let poles = |k: &StateSpace<Discrete>| {
-            let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
-            let of_loop = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
-            Some((plant.poles().ok()?, of_loop))
-        };
-        let Some((own, of_loop)) = self.feedback.and_then(poles) else { return Vec::new() };
+        let Some([own, of_loop]) = self.poles(choice) else { return Vec::new() };
         let apart = |z: &c64| own.iter().map(|p| (p - z).norm()).fold(f64::INFINITY, f64::min);
         of_loop.into_iter().filter(|z| z.norm() >= 1.0).map(|z| (z, apart(&z))).collect()
+    }
+
+    /// Poles of a model and of its loop; `None` where the feedback is not known.
+    pub(super) fn poles(&self, choice: &Choice) -> Option<[Vec<c64>; 2]> {
+        let k = self.feedback?;
+        let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
+        let of_loop = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
+        Some([plant.poles().ok()?, of_loop])
     }
 
     /// What a search found on so many samples.

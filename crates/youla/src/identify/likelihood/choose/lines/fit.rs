@@ -1,6 +1,6 @@
 //! A disturbance at one frequency in what a model leaves of a record: its frequency, amplitudes and sidebands.
 
-use super::problem::{Choice, Problem};
+use crate::identify::likelihood::choose::problem::{Choice, Problem};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra};
 use crate::linalg::{TINY, golden_section};
 use faer::linalg::solvers::SolveLstsq;
@@ -135,20 +135,39 @@ impl Residual {
     }
 }
 
-/// Disturbances over all rows of a record. The amplitudes of each are those of least squares on the lines around it, where the noise is
-/// that of its frequency: a drift has thousands of times the power of the noise there.
+/// Disturbances over all rows of a record.
 pub(super) fn disturbance(residual: &Residual, rows: usize, taken: &[Line]) -> Mat<f64> {
+    of_amplitudes(rows, taken, &amplitudes(residual, rows, taken))
+}
+
+/// Cosine and sine of a line over the rows of a record, each with its slow changes.
+fn shapes(line: &Line, rows: usize, changes: usize) -> Mat<f64> {
+    Mat::from_fn(rows, 2 * changes, |t, c| {
+        let (sin, cos) = (TAU * (line.mask.middle * t as f64).fract()).sin_cos();
+        let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
+        slow * if c % 2 == 0 { cos } else { sin }
+    })
+}
+
+/// Disturbances of given amplitudes over the rows of a record.
+pub(super) fn of_amplitudes(rows: usize, taken: &[Line], amplitudes: &[Mat<f64>]) -> Mat<f64> {
+    let channels = amplitudes.first().map_or(0, Mat::ncols);
+    let add = |sum, (line, a): (&Line, &Mat<f64>)| sum + shapes(line, rows, a.nrows() / 2) * a;
+    taken.iter().zip(amplitudes).fold(Mat::zeros(rows, channels), add)
+}
+
+/// Amplitudes of each disturbance, two for each slow change, by channel: those of least squares on the lines around it, where the noise is
+/// that of its frequency. A drift has thousands of times the power of the noise there.
+pub(super) fn amplitudes(residual: &Residual, rows: usize, taken: &[Line]) -> Vec<Mat<f64>> {
     let Residual { lines, samples } = residual;
     let fft = FftPlanner::new().plan_fft_forward(*samples);
-    let (mut left, mut all) = (lines.clone(), Mat::<f64>::zeros(rows, lines.ncols()));
-    for Line { mask, changes } in (0..SWEEPS).flat_map(|_| taken) {
-        // A short record determines no more.
-        let changes = (*changes).min(samples / SAMPLES_PER_CHANGE).max(1);
-        let shapes = Mat::from_fn(rows, 2 * changes, |t, c| {
-            let (sin, cos) = (TAU * (mask.middle * t as f64).fract()).sin_cos();
-            let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
-            slow * if c % 2 == 0 { cos } else { sin }
-        });
+    // A short record determines no more.
+    let changes = |line: &Line| line.changes.min(samples / SAMPLES_PER_CHANGE).max(1);
+    let mut found: Vec<Mat<f64>> = taken.iter().map(|line| Mat::zeros(2 * changes(line), lines.ncols())).collect();
+    let mut left = lines.clone();
+    for (place, line) in (0..SWEEPS).flat_map(|_| taken.iter().enumerate()) {
+        let (mask, changes) = (&line.mask, changes(line));
+        let shapes = shapes(line, rows, changes);
         let mut transformed = Mat::<c64>::zeros(lines.nrows(), 2 * changes);
         for (to, shape) in transformed.col_iter_mut().zip(shapes.col_iter()) {
             let mut work: Vec<c64> = shape.iter().skip(rows - samples).map(|x| c64::new(*x, 0.0)).collect();
@@ -168,9 +187,9 @@ pub(super) fn disturbance(residual: &Residual, rows: usize, taken: &[Line]) -> M
         };
         let amplitudes = part(&transformed).qr().solve_lstsq(part(&left));
         left -= &transformed * Mat::from_fn(2 * changes, left.ncols(), |i, j| c64::new(amplitudes[(i, j)], 0.0));
-        all += shapes * amplitudes;
+        found[place] += amplitudes;
     }
-    all
+    found
 }
 
 #[cfg(test)]

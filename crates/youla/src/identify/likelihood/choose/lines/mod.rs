@@ -4,7 +4,9 @@
 //! acts on the outputs alone, `y = G u + cos, sin + v`: its amplitudes are those of the residual without the mode. What is left of the
 //! outputs, without the lines next to it (weight zero), says whether it was one: then the criterion is less without the mode.
 
-use super::line_fit::{Line, Residual, WIDEST, disturbance, sharpened, with_sidebands};
+mod fit;
+mod shown;
+
 use super::loads::{self, Nuisance, Steps};
 use super::problem::{Choice, Problem, Solution, Task};
 use super::unmoved::Motion;
@@ -18,6 +20,8 @@ use crate::identify::subspace::Experiment;
 use crate::identify::verdict::limits::LARGEST_LINE;
 use crate::linalg::TINY;
 use faer::Mat;
+use fit::{Line, Residual, WIDEST, disturbance, sharpened, with_sidebands};
+pub(crate) use shown::shown;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -106,9 +110,19 @@ impl Cleaned {
     }
 }
 
-/// The model that records support, and what it takes out of them.
-pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
-    let mut now = loads::with_steps(all, fresh, loads::solve(all, fresh, table)?, table);
+/// The model that records support, and what it takes out of them; `lines` are the frequencies of disturbances that the records show without a
+/// model, shares of the sample rate.
+pub(crate) fn solve(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    lines: &[f64],
+    table: &mut Vec<Candidate>,
+) -> Option<Cleaned> {
+    let first = shown::without(all, fresh, lines, table);
+    let first = first.map_or_else(|| loads::solve(all, fresh, table), Some)?;
+    let more = [lines, &shown::of_loop(all, &first)].concat();
+    let less = (more.len() > lines.len()).then(|| shown::without(all, fresh, &more, table)).flatten();
+    let mut now = loads::with_steps(all, fresh, less.unwrap_or(first), table);
     for _ in 0..ROUNDS {
         let Some(next) = less_lines(all, fresh, &now, table) else { break };
         now = next;
@@ -139,14 +153,8 @@ fn less_lines(
         }
         let mut taken = now.lines.clone();
         turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
-        let outputs = [(all.experiments, &residuals[0]), (fresh, &residuals[1])].map(|(records, residuals)| {
-            let of = |(e, left): (&Experiment<'_>, &Option<Residual>)| match left {
-                Some(left) => e.y - disturbance(left, e.y.nrows(), &taken),
-                None => e.y.to_owned(),
-            };
-            records.iter().zip(residuals).map(of).collect()
-        });
-        let mut next = Cleaned { lines: taken, outputs: Some(outputs), ..now.clone() };
+        let outputs = Some([(all.experiments, &residuals[0]), (fresh, &residuals[1])].map(|of| subtracted(of, &taken)));
+        let mut next = Cleaned { lines: taken, outputs, ..now.clone() };
         let records = next.records(0, all.experiments);
         let problem = next.problem(all, &records);
         let spectra = Arc::new(problem.spectra(delays));
@@ -243,16 +251,36 @@ impl Narrow {
         }
         let kept = |t: &Vec<f64>| (0..t.len()).filter(|i| !left_out.contains(i)).map(|i| t[i]).collect();
         let point = Point { model: self.model.without(&self.places), ends: whole.ends.iter().map(kept).collect() };
-        let bare = Problem { masked: Vec::new(), ..clean.clone() };
-        let mut residuals = point.residuals(&bare.spectra_of(records, &choice.delays)).into_iter();
-        let of = |e: &Experiment<'_>| {
-            let rows = e.y.nrows();
-            let v = long_enough(rows, clean.skip).then(|| residuals.next()).flatten()?;
-            let (samples, p) = (rows - clean.skip, clean.sizes.y.len());
-            // The spectra are those of outputs over their sizes, over the root of the samples.
-            let scale = |i: usize| clean.sizes.y[i] * (samples as f64).sqrt();
-            Some(Residual { lines: Mat::from_fn(v.len() / p, p, |k, i| v[k * p + i] * scale(i)), samples })
-        };
-        records.iter().map(of).collect()
+        residuals(&point, clean, choice, records)
     }
+}
+
+/// The outputs of some records without disturbances, from what a model leaves of each.
+fn subtracted((records, left): (&[Experiment<'_>], &Vec<Option<Residual>>), taken: &[Line]) -> Vec<Mat<f64>> {
+    let of = |(e, left): (&Experiment<'_>, &Option<Residual>)| match left {
+        Some(left) => e.y - disturbance(left, e.y.nrows(), taken),
+        None => e.y.to_owned(),
+    };
+    records.iter().zip(left).map(of).collect()
+}
+
+/// What a model leaves of the outputs of some records, behind the first samples that are skipped, with the lines that do not count; `None` for a
+/// record that has no lines.
+fn residuals(
+    point: &Point,
+    problem: &Problem<'_>,
+    choice: &Choice,
+    records: &[Experiment<'_>],
+) -> Vec<Option<Residual>> {
+    let bare = Problem { masked: Vec::new(), ..problem.clone() };
+    let mut residuals = point.residuals(&bare.spectra_of(records, &choice.delays)).into_iter();
+    let of = |e: &Experiment<'_>| {
+        let rows = e.y.nrows();
+        let v = long_enough(rows, problem.skip).then(|| residuals.next()).flatten()?;
+        let (samples, p) = (rows - problem.skip, problem.sizes.y.len());
+        // The spectra are those of outputs over their sizes, over the root of the samples.
+        let scale = |i: usize| problem.sizes.y[i] * (samples as f64).sqrt();
+        Some(Residual { lines: Mat::from_fn(v.len() / p, p, |k, i| v[k * p + i] * scale(i)), samples })
+    };
+    records.iter().map(of).collect()
 }

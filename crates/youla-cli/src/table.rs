@@ -8,7 +8,7 @@ use youla_loop::redesign::structured::PidController;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Paper, StudyExperiment, StudyMethod};
 use youla_report::numbers::fit;
-use youla_run::{Identification, ModelValidation, WrittenRun, cautions};
+use youla_run::{Identification, ModelValidation, WrittenRun, cautions, low_fit};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
@@ -24,6 +24,9 @@ pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     }
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
+    }
+    if let Some(sentence) = low_fit(found, &written.summary) {
+        let _ = write!(text, "\n{sentence}");
     }
     for caution in cautions(found, &written.summary) {
         let _ = write!(text, "\ncaution: {caution}");

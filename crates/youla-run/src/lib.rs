@@ -37,6 +37,7 @@ pub use folder::artefacts::{Provenance, RunModelFile, SCHEMA};
 pub use folder::write::{WrittenRun, write_into, write_run};
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;
+pub use page::fit::low_fit;
 pub use page::notes::cautions;
 pub use page::page;
 pub use records::segments::RecordSegment;

@@ -45,6 +45,13 @@ pub(super) fn line(found: &Identification, summary: &Summary) -> Option<Verdict>
     Some(Verdict { status, text, evidence: ReportPart::Fits })
 }
 
+/// The same as a sentence for the terminal, where the fit is low and not a warning, which is among those of the run.
+pub fn low_fit(found: &Identification, summary: &Summary) -> Option<String> {
+    let (_, model) = subject(found, summary)?;
+    model.mean_fit().filter(|fit| *fit < LOW)?;
+    line(found, summary).filter(|line| line.status == LineStatus::Info).map(|line| line.text)
+}
+
 fn percent(fit: f64) -> String {
     if fit.is_finite() { format!("{} %", numbers::fit(fit, 1)) } else { "no prediction".into() }
 }

@@ -10,7 +10,7 @@ pub(crate) mod redesign;
 pub(crate) mod verdict;
 
 mod certificate;
-mod fit;
+pub(crate) mod fit;
 mod frequency;
 mod loops;
 mod nonparametric;

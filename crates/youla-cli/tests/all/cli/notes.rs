@@ -33,6 +33,33 @@ fn a_residual_of_rounding_depends_on_nothing() {
     assert!(!text.contains("depends on past excitation"), "{text}");
 }
 
+/// A log that is mostly noise has a fit below half: the terminal says that the noise is the reason. The log with little noise needs no such sentence.
+#[test]
+fn a_low_fit_has_its_reason_on_the_terminal() {
+    let (mut y, mut before, mut state) = (0.0, 0.0, 1u64);
+    let mut noise = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let rows: Vec<[f64; 4]> = log()
+        .into_iter()
+        .map(|[t, _, d, _]| {
+            let measured = y + 1.5 * noise();
+            let (u, now) = (d - 2.0 * measured, y);
+            (y, before) = (1.5 * y - 0.56 * before + 0.06 * u, now);
+            [t, u, d, measured]
+        })
+        .collect();
+    let folder = loop_folder("low-fit", &[("noisy.csv", csv(&rows).as_bytes())]);
+    std::fs::write(folder.join("noisy.toml"), SETTINGS.replace("log.csv", "noisy.csv")).expect("written");
+    for (file, said) in [("noisy.toml", true), ("run.toml", false)] {
+        let found = youla(&folder, &["identify", file]);
+        let text = found.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(found.code, Some(0), "{}", found.stderr);
+        assert_eq!(text.contains("What is left does not depend on past excitation: it is noise"), said, "{text}");
+    }
+}
+
 /// The largest pole of the models in the region, and the interval of that of the plant, differ: the sentence says why.
 #[test]
 fn a_region_reaches_further_than_an_interval() {

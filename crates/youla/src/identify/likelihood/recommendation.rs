@@ -79,7 +79,9 @@ impl Recommendation {
             ),
             0 => format!("{first}. No band is valid to 10 %."),
             _ if failed == 0 => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
-            _ if self.in_doubt() => format!("{first}. The model itself is in doubt, at all frequencies."),
+            _ if self.in_doubt() => {
+                format!("{first}. The failed tests are of the model itself: no band of frequencies is stated.")
+            }
             _ => format!("{first}. Its response is within 10 % from {}.", bands.join(", ")),
         }
     }

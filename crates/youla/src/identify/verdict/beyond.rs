@@ -2,9 +2,10 @@
 
 use super::Loops;
 use super::limits::LARGEST_UNSEEN_GAIN;
+use super::loop_ratio::LoopAt;
 use crate::identify::likelihood::{Evidence, figure};
 use crate::lti::largest_singular_value;
-use crate::{Mat, MatRef, c64};
+use crate::{Mat, c64};
 
 /// The largest gain of the loop there, `sigma_max(G K (I - G K)^-1)`, with the frequency from which it counts; `None` where no frequency is shown, or
 /// none lies above. A factor of G beyond one over it makes the loop unstable at some phase, and a model continues what it has.
@@ -12,8 +13,10 @@ use crate::{Mat, MatRef, c64};
 /// `shown` says whether the excitation shows what each input does at a frequency in Hz; `sizes` are those of the outputs.
 pub(super) fn beyond(loops: &Loops, shown: impl Fn(f64) -> bool, sizes: &[f64]) -> Option<Evidence> {
     let from = loops.at.iter().rposition(|at| shown(at.hz))?;
-    let gain = |s: &Mat<c64>| largest_singular_value(of_loop(s, sizes).as_ref()).unwrap_or(0.0);
-    let above = loops.at[from + 1..].iter().map(|at| (gain(&at.s), at.hz));
+    // G K (I - G K)^-1 = S - I
+    let of_loop = |at: &LoopAt| at.sensitivity(sizes) - Mat::<c64>::identity(sizes.len(), sizes.len());
+    let gain = |at: &LoopAt| largest_singular_value(of_loop(at).as_ref()).unwrap_or(0.0);
+    let above = loops.at[from + 1..].iter().map(|at| (gain(at), at.hz));
     let (largest, hz) = above.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let question =
         "Gain of the closed loop above the frequencies at which the excitation shows the plant (unseen gain)";
@@ -25,16 +28,9 @@ pub(super) fn beyond(loops: &Loops, shown: impl Fn(f64) -> bool, sizes: &[f64]) 
     Some(Evidence::new(question, largest, LARGEST_UNSEEN_GAIN).at([hz; 2]).reported().noted(times))
 }
 
-/// `G K (I - G K)^-1 = S - I` in units of the sizes.
-fn of_loop(s: &Mat<c64>, sizes: &[f64]) -> Mat<c64> {
-    let s: MatRef<'_, c64> = s.as_ref();
-    Mat::from_fn(s.nrows(), s.ncols(), |i, j| s[(i, j)] * (sizes[j] / sizes[i]) - if i == j { 1.0 } else { 0.0 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::verdict::loop_ratio::LoopAt;
     use crate::lti::{Discrete, StateSpace};
 
     /// `G K / (1 - G K)` of G = 0.2 and K = -1 is -1/6 above the last frequency shown; nothing is left above where all are.

@@ -73,6 +73,11 @@ impl LoopAt {
         LoopAt { hz, s, ks, chordal }
     }
 
+    /// `(I - G K)^-1` in units of some sizes of the outputs.
+    pub(super) fn sensitivity(&self, sizes: &[f64]) -> Mat<c64> {
+        Mat::from_fn(sizes.len(), sizes.len(), |i, j| self.s[(i, j)] * (sizes[j] / sizes[i]))
+    }
+
     /// `kappa / rho` of an error: the root of the largest mean square.
     pub(crate) fn error(&self, error: &ResponseError) -> f64 {
         let (all, one) = (error.all(), identity(self.s.nrows()));

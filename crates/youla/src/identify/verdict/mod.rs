@@ -36,6 +36,7 @@ pub(crate) use nonlinear::{NonlinearPart, nonlinear};
 pub(crate) use parts::Parts;
 pub(crate) use witness::Witness;
 
+use crate::Result;
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::choose::problem::{GROWTH, Problem, Solution};
@@ -47,7 +48,6 @@ use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
-use crate::{Mat, Result};
 use limits::{INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION};
 use loop_ratio::{LoopAt, bands, judged_hz, valid};
 
@@ -131,10 +131,7 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     let information = on.witness.zip(loops.as_ref()).map(|(witness, loops)| information(on, witness, loops));
     let informed = information.as_ref().is_none_or(Evidence::holds);
     evidence.extend(information);
-    let sensitivity = |share: f64| {
-        let at = loops.as_ref()?.near(share / ts)?;
-        Some(Mat::from_fn(sizes.len(), sizes.len(), |i, j| at.s[(i, j)] * (sizes[j] / sizes[i])))
-    };
+    let sensitivity = |share: f64| Some(loops.as_ref()?.near(share / ts)?.sensitivity(sizes));
     let seen = |share: f64| on.witness.is_none_or(|witness| witness.shows(share));
     evidence.extend(on.parts.evidence(ts, &sensitivity, &seen));
     if let Some(witness) = on.witness.filter(|witness| !witness.variation.is_empty()) {

@@ -40,24 +40,14 @@ pub(super) fn least_cost(
     (known, enough): (Option<Entry>, f64),
     options: &SearchOptions,
 ) -> (f64, Noise) {
-    match known.and_then(|entry| cost_near(spectra, point, entry, options)) {
+    match cost_near(spectra, point, known, options) {
         Some(near) if near.0 < enough => near,
-        near => {
-            let found = cost(spectra, point, options);
-            near.filter(|near| near.0 < found.0).unwrap_or(found)
-        }
+        near => lesser(near, cost(spectra, point, options)),
     }
 }
 
-/// The lesser of what was found and that with known noise at the inputs.
-pub(super) fn lesser(
-    spectra: &Spectra,
-    point: &Point,
-    known: Option<Entry>,
-    found: (f64, Noise),
-    options: &SearchOptions,
-) -> (f64, Noise) {
-    let near = known.and_then(|entry| cost_near(spectra, point, entry, options));
+/// The lesser of that with known noise at the inputs, where there is one, and of what was found.
+pub(super) fn lesser(near: Option<(f64, Noise)>, found: (f64, Noise)) -> (f64, Noise) {
     near.filter(|near| near.0 < found.0 || found.0.is_nan()).unwrap_or(found)
 }
 
@@ -71,8 +61,14 @@ pub(super) fn cost_beside(
     least_cost(spectra, point, (known.and_then(Noise::entry).cloned(), f64::NEG_INFINITY), options)
 }
 
-/// The same with that noise; `None` where it has no filter.
-fn cost_near(spectra: &Spectra, point: &Point, entry: Entry, options: &SearchOptions) -> Option<(f64, Noise)> {
+/// The same with known noise at the inputs; `None` where none is known, and where it has no filter.
+pub(super) fn cost_near(
+    spectra: &Spectra,
+    point: &Point,
+    known: Option<Entry>,
+    options: &SearchOptions,
+) -> Option<(f64, Noise)> {
+    let entry = known?;
     if entry.colour.is_some() && !coloured(spectra, options) {
         return None;
     }

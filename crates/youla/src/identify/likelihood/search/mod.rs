@@ -35,7 +35,7 @@ use begin::begun;
 use by_output::{Ends, Normal};
 use chart::Chart;
 pub(crate) use cost::deviance;
-use cost::{cost, cost_beside, least_cost, lesser, value_of};
+use cost::{cost, cost_beside, cost_near, least_cost, lesser, value_of};
 use driven::has_line;
 use faer::Mat;
 use feedthrough::Answer;
@@ -214,7 +214,7 @@ fn on_lines(spectra: &Spectra, start: Point, known: Option<&Noise>, options: &Se
             } else {
                 // The step of the sizes is not known.
                 let found = cost(spectra, &trial, options);
-                if found.0 < least { found } else { lesser(spectra, &trial, moved, found, options) }
+                if found.0 < least { found } else { lesser(cost_near(spectra, &trial, moved, options), found) }
             };
             let usable = value.is_finite() && (options.radius.is_infinite() || inside());
             usable.then_some(((trial, value, noise), least - value))

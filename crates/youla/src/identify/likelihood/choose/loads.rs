@@ -50,7 +50,7 @@ impl Step {
 pub(crate) type Steps = [Vec<Vec<Step>>; 2];
 
 /// The inputs with the load that acts beside them.
-fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat<f64>> {
+pub(super) fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat<f64>> {
     let with = |(e, steps): (&Experiment<'_>, &Vec<Step>)| {
         let mut u = e.u.to_owned();
         for step in steps {

@@ -134,18 +134,12 @@ pub(super) fn of_lines(
     fed_back: bool,
     options: &CheckOptions,
 ) -> Vec<Finding> {
-    let mut known: Vec<Vec<f64>> = Vec::new();
-    let columns = |x: MatRef<'_, f64>| x.col_iter().map(|c| c.iter().copied().collect()).collect::<Vec<Vec<f64>>>();
-    for x in [record.input_excitation, record.alpha, record.reference].into_iter().flatten() {
-        known.extend(columns(x));
-    }
+    let known = [record.input_excitation, record.alpha, record.reference];
+    let mut known: Vec<MatRef<'_, f64>> = known.into_iter().flatten().collect();
     if known.is_empty() && !fed_back {
-        known = columns(record.u);
+        known.push(record.u);
     }
-    let known: Vec<&[f64]> = known.iter().map(Vec::as_slice).collect();
-    let outputs = columns(record.y);
-    let one = |(values, channel): (&Vec<f64>, &Channel)| {
-        lines::finding(&spectral_lines(values, &known, record.time, options.line_false_alarm), record.name, channel)
-    };
-    outputs.iter().zip(&names.outputs).filter_map(one).collect()
+    let found = spectral_lines(&[record.y], &known, record.time, options.line_false_alarm);
+    let one = |(lines, channel): (&Vec<_>, &Channel)| lines::finding(lines, record.name, channel);
+    found.iter().zip(&names.outputs).filter_map(one).collect()
 }

@@ -1,6 +1,6 @@
 //! Narrow lines in a signal that no excitation has: unbalance, run-out, gears, mains.
 //!
-//! What the excitation explains of the bins of the Hann-windowed transform, by a gain for each group of neighbouring bins, is left out: beside the
+//! What the excitation explains of the bins of the Hann-windowed transform, by a gain with a slope for each group of neighbouring bins, is left out: beside the
 //! response to it a line would have to exceed that response. A bin of what is left is compared with the median of its neighbours, without the two
 //! on either side that it leaks into. Over noise the ratio to the mean of the neighbours has, with nu of them independent, the tail
 //! `(1 + x / nu)^-nu`, from which the threshold for the given probability in N / 2 lines follows. Resonances are wider than a line
@@ -11,8 +11,9 @@
 
 use crate::linalg::TINY;
 use crate::lti::Discrete;
+use crate::statistics::median;
 use faer::linalg::solvers::SolveLstsq;
-use faer::{Mat, c64};
+use faer::{ColRef, Mat, MatRef, c64};
 use rustfft::FftPlanner;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -44,48 +45,35 @@ const NEAR: f64 = 43.6;
 const FALL: f64 = 0.2;
 /// Ratio of a line of an excitation, over the threshold, from which it is taken to be the cause; noise reaches it in one of 1e4.
 const SHARED: f64 = 0.6;
-/// First bin that may be a line.
+/// First bin that may be a line: a drift or the travel of an axis falls over the bins below it as steeply as a line. Chosen.
 const FIRST: usize = 12;
 /// Lines of an excitation from which it is periodic, as a share of the bins: its lines are everywhere.
 /// Chosen, not measured.
 const PERIODIC: f64 = 0.02;
 
-/// The lines of `values` that none of the `known` signals has; `false_alarm` is the probability that a record of noise has one.
+/// The lines of each column of some signals that none of the `known` ones has; known signals of another length than these are left out of account.
+/// `false_alarm` is the probability that a column of noise has one.
 ///
 /// ```
-/// use youla::{lti::Discrete, signal::spectral_lines};
+/// use youla::{Mat, lti::Discrete, signal::spectral_lines};
 /// let noise = |k: usize| ((k * k * 31 + 7 * k) % 8191) as f64 / 8191.0 - 0.5;
-/// let y: Vec<f64> = (0..4000).map(|k| noise(k) + 0.2 * (k as f64 * 0.5).sin()).collect();
-/// let found = spectral_lines(&y, &[], Discrete::new(0.01)?, 1e-3);
-/// assert_eq!(found.len(), 1);
-/// assert!((found[0].hz - 7.958).abs() < 0.01 && (found[0].amplitude - 0.2).abs() < 0.02);
+/// let y = Mat::from_fn(4000, 1, |k, _| noise(k) + 0.2 * (k as f64 * 0.5).sin());
+/// let found = spectral_lines(&[y.as_ref()], &[], Discrete::new(0.01)?, 1e-3);
+/// assert_eq!(found[0].len(), 1);
+/// assert!((found[0][0].hz - 7.958).abs() < 0.01 && (found[0][0].amplitude - 0.2).abs() < 0.02);
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn spectral_lines(values: &[f64], known: &[&[f64]], time: Discrete, false_alarm: f64) -> Vec<SpectralLine> {
-    let n = values.len();
-    let Some(mut spectrum) = Spectrum::new(values) else { return Vec::new() };
-    let known: Vec<Spectrum> = known.iter().filter(|k| k.len() == n).filter_map(|k| Spectrum::new(k)).collect();
-    spectrum.leave_out(&known);
-    let threshold = spectrum.threshold(false_alarm);
-    let shared =
-        |k: usize, other: &Spectrum| (k - 1..=k + 1).any(|i| other.ratio(i) > SHARED * threshold) || other.periodic;
-    let mut found: Vec<SpectralLine> = Vec::new();
-    for k in spectrum.lines(threshold) {
-        if !spectrum.lasts(k) || known.iter().any(|other| shared(k, other)) {
-            continue;
-        }
-        let hz = spectrum.between(k) / (n as f64 * time.ts());
-        let amplitude = spectrum.amplitude(k);
-        found.push(SpectralLine { hz, amplitude, ratio: spectrum.ratio(k), threshold, multiple: None });
-    }
-    let bin = 1.0 / (n as f64 * time.ts());
-    if let Some(first) = found.first().map(|line| line.hz) {
-        for line in &mut found {
-            let multiple = (line.hz / first).round();
-            line.multiple = ((line.hz - multiple * first).abs() < (1.0 + multiple) * bin).then_some(multiple as usize);
-        }
-    }
-    found
+pub fn spectral_lines(
+    signals: &[MatRef<'_, f64>],
+    known: &[MatRef<'_, f64>],
+    time: Discrete,
+    false_alarm: f64,
+) -> Vec<Vec<SpectralLine>> {
+    let rows = signals.first().map_or(0, MatRef::nrows);
+    let known = known.iter().filter(|x| x.nrows() == rows).flat_map(|x| x.col_iter());
+    let known: Vec<Spectrum> = known.filter_map(Spectrum::new).collect();
+    let of = |column| Spectrum::new(column).map_or_else(Vec::new, |x| x.beside(&known, time, false_alarm));
+    signals.iter().flat_map(|x| x.col_iter()).map(of).collect()
 }
 
 /// Least share of the largest amplitude at a quarter, half and three quarters of a record that a line keeps at each.
@@ -119,12 +107,14 @@ struct Spectrum {
     side: usize,
     samples: usize,
     periodic: bool,
+    /// Mean of the power of all bins.
+    mean_power: f64,
 }
 
 impl Spectrum {
     /// `None` for constant or short signals.
-    fn new(values: &[f64]) -> Option<Self> {
-        let n = values.len();
+    fn new(values: ColRef<'_, f64>) -> Option<Self> {
+        let n = values.nrows();
         let side = (n / 400).clamp(SIDE[0], SIDE[1]);
         let mean = values.iter().sum::<f64>() / n.max(1) as f64;
         if n < 16 * SIDE[0] || values.iter().all(|v| *v == values[0]) {
@@ -135,15 +125,39 @@ impl Spectrum {
             values.iter().enumerate().map(|(k, v)| c64::new((v - mean) * window(k), 0.0)).collect();
         FftPlanner::new().plan_fft_forward(n).process(&mut bins);
         bins.truncate(n / 2);
-        let power = bins.iter().map(c64::norm_sqr).collect();
-        let mut spectrum = Spectrum { bins, power, explained: Vec::new(), side, samples: n, periodic: false };
+        let power: Vec<f64> = bins.iter().map(c64::norm_sqr).collect();
+        let mean_power = power.iter().sum::<f64>() / power.len() as f64;
+        let mut spectrum =
+            Spectrum { bins, power, explained: Vec::new(), side, samples: n, periodic: false, mean_power };
         let many = spectrum.lines(spectrum.threshold(1e-3)).len() as f64;
         spectrum.periodic = many > PERIODIC * spectrum.power.len() as f64;
         Some(spectrum)
     }
 
-    fn mean_power(&self) -> f64 {
-        self.power.iter().sum::<f64>() / self.power.len() as f64
+    /// The lines that none of the known signals has.
+    fn beside(mut self, known: &[Spectrum], time: Discrete, false_alarm: f64) -> Vec<SpectralLine> {
+        self.leave_out(known);
+        let threshold = self.threshold(false_alarm);
+        let has =
+            |other: &Spectrum, k: usize| other.periodic || (k - 1..=k + 1).any(|i| other.ratio(i) > SHARED * threshold);
+        let own = |k: &usize| self.lasts(*k) && !known.iter().any(|other| has(other, *k));
+        let bin = 1.0 / (self.samples as f64 * time.ts());
+        let line = |k: usize| SpectralLine {
+            hz: self.between(k) * bin,
+            amplitude: self.amplitude(k),
+            ratio: self.ratio(k),
+            threshold,
+            multiple: None,
+        };
+        let mut found: Vec<SpectralLine> = self.lines(threshold).into_iter().filter(own).map(line).collect();
+        if let Some(first) = found.first().map(|line| line.hz) {
+            for line in &mut found {
+                let multiple = (line.hz / first).round();
+                let apart = (line.hz - multiple * first).abs();
+                line.multiple = (apart < (1.0 + multiple) * bin).then_some(multiple as usize);
+            }
+        }
+        found
     }
 
     /// Leaves out what other signals explain, by a gain that changes linearly over the bins around each group of neighbouring ones.
@@ -190,9 +204,8 @@ impl Spectrum {
         if k < FIRST || k + side + 2 >= last {
             return None;
         }
-        let mut near = [&self.power[k.saturating_sub(side).max(1)..k - 2], &self.power[k + 3..=k + side]].concat();
-        let middle = near.len() / 2;
-        Some(*near.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2)
+        let near = [&self.power[k.saturating_sub(side).max(1)..k - 2], &self.power[k + 3..=k + side]].concat();
+        Some(median(near) / std::f64::consts::LN_2)
     }
 
     fn ratio(&self, k: usize) -> f64 {
@@ -258,9 +271,7 @@ impl Gains {
             let decides = |k: usize| known.iter().zip(&total).any(|(x, total)| x.power[k] > DECISIVE * total);
             let largest = kept.iter().zip(&power).filter(|(k, _)| !decides(**k)).max_by(|a, b| a.1.total_cmp(b.1));
             let Some((line, largest)) = largest.map(|(k, power)| (*k, *power)) else { break };
-            let mut sorted = power;
-            sorted.sort_by(f64::total_cmp);
-            if largest <= OUTLYING * sorted[sorted.len() / 2] {
+            if largest <= OUTLYING * median(power) {
                 break;
             }
             kept.retain(|k| k.abs_diff(line) > 2);
@@ -272,7 +283,7 @@ impl Gains {
     fn fitted(&self, bins: &[c64], known: &[Spectrum], kept: &[usize]) -> Self {
         // One more row for each column, of rounding, keeps the gain of a signal without power at zero.
         let (rows, columns) = (kept.len(), 2 * known.len());
-        let little: Vec<f64> = known.iter().map(|x| (ROUNDING * x.mean_power()).max(TINY).sqrt()).collect();
+        let little: Vec<f64> = known.iter().map(|x| (ROUNDING * x.mean_power).max(TINY).sqrt()).collect();
         let x = Mat::from_fn(rows + columns, columns, |r, c| match kept.get(r) {
             Some(k) => self.column(known, *k, c),
             None if r - rows == c => c64::new(little[c / 2], 0.0),
@@ -300,11 +311,18 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
+    /// The lines of a signal beside none or one.
+    fn lines_of(values: &[f64], known: Option<&[f64]>) -> Vec<SpectralLine> {
+        let column = |x: &[f64]| Mat::from_fn(x.len(), 1, |k, _| x[k]);
+        let known = known.map(column);
+        let known: Vec<MatRef<'_, f64>> = known.iter().map(Mat::as_ref).collect();
+        spectral_lines(&[column(values).as_ref()], &known, Discrete::new(1e-3).unwrap(), 1e-3).remove(0)
+    }
+
     /// Noise through a resonance of 0.5 % damping has no line in 200 records (at most one by the stated probability of 1e-3
     /// each); a line at a tenth of the deviation is found in all, its double with the relation in nearly all.
     #[test]
     fn a_resonance_is_no_line() {
-        let time = Discrete::new(1e-3).unwrap();
         let (mut false_alarms, mut both) = (0, 0);
         for seed in 0..200 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -314,11 +332,11 @@ mod tests {
                 let noise: f64 = rng.sample(StandardNormal);
                 y.push(2.0 * radius * angle.cos() * y[k - 1] - radius * radius * y[k - 2] + noise);
             }
-            false_alarms += spectral_lines(&y, &[], time, 1e-3).len();
+            false_alarms += lines_of(&y, None).len();
             let line =
                 |k: usize| 5.0 * (TAU * 41.67 * k as f64 * 1e-3).sin() + 5.0 * (TAU * 83.34 * k as f64 * 1e-3).cos();
             let disturbed: Vec<f64> = y.iter().enumerate().map(|(k, y)| y + line(k)).collect();
-            let found = spectral_lines(&disturbed, &[], time, 1e-3);
+            let found = lines_of(&disturbed, None);
             assert!(
                 (found[0].hz - 41.67).abs() < 0.02 && (found[0].amplitude - 5.0).abs() < 0.6,
                 "seed {seed}: {found:?}"
@@ -329,11 +347,11 @@ mod tests {
         assert!(both >= 190, "{both}");
         assert!(false_alarms <= 1, "{false_alarms}");
     }
+
     /// A line 20 dB below the response of a resonance to noise is found beside the noise where the excitation is known, in 100 of 100 records, and not without
     /// it; in the response alone there is none.
     #[test]
     fn a_line_below_the_response_to_the_excitation_is_found() {
-        let time = Discrete::new(1e-3).unwrap();
         let mut false_alarms = 0;
         for seed in 0..100 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -345,11 +363,11 @@ mod tests {
                 response.push(2.0 * radius * angle.cos() * response[k - 1] - radius * radius * response[k - 2] + x[k]);
             }
             let y: Vec<f64> = response.iter().map(|y| y + 0.1 * normal()).collect();
-            false_alarms += spectral_lines(&y, &[&x], time, 1e-3).len();
+            false_alarms += lines_of(&y, Some(&x)).len();
             let line = |k: usize| 0.1 * (TAU * 40.0 * k as f64 * 1e-3).sin();
             let disturbed: Vec<f64> = y.iter().enumerate().map(|(k, y)| y + line(k)).collect();
-            assert!(spectral_lines(&disturbed, &[], time, 1e-3).is_empty(), "seed {seed}");
-            let found = spectral_lines(&disturbed, &[&x], time, 1e-3);
+            assert!(lines_of(&disturbed, None).is_empty(), "seed {seed}");
+            let found = lines_of(&disturbed, Some(&x));
             assert!(found.iter().any(|l| (l.hz - 40.0).abs() < 0.03), "seed {seed}: {found:?}");
         }
         assert!(false_alarms <= 1, "{false_alarms}");

@@ -126,8 +126,8 @@ pub fn recommend(
     let (estimation, verification, known) = (estimation.as_slice(), verification.as_slice(), known.as_ref());
     let all = problem(estimation, known, options)?;
     let mut candidates = Vec::new();
-    let shown = lines::shown(estimation, known.map(|known| known.estimation.as_slice()));
-    let found = lines::solve(&all, verification, &shown, &mut candidates);
+    let signals = known.map_or(&[][..], |known| &known.estimation);
+    let found = lines::solve(&all, verification, signals, &mut candidates);
     let found = found.ok_or(Error::NoCandidate { samples: all.samples().0 })?;
     let (p, given) = (all.sizes.y.len(), &options.sampled_every);
     if !given.is_empty() && given.len() != p {

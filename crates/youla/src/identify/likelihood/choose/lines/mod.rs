@@ -8,20 +8,19 @@ mod fit;
 mod shown;
 
 use super::loads::{self, Nuisance, Steps};
-use super::problem::{Choice, Problem, Solution, Task};
+use super::problem::{Choice, Problem, Solution};
 use super::unmoved::Motion;
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
 use crate::identify::likelihood::search::driven::NARROW;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
-use crate::identify::likelihood::{Candidate, Evidence};
+use crate::identify::likelihood::{Candidate, Evidence, LoopSignals};
 use crate::identify::subspace::Experiment;
 use crate::identify::verdict::limits::LARGEST_LINE;
 use crate::linalg::TINY;
 use faer::Mat;
 use fit::{Line, Residual, WIDEST, disturbance, sharpened, with_sidebands};
-pub(crate) use shown::shown;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -110,17 +109,17 @@ impl Cleaned {
     }
 }
 
-/// The model that records support, and what it takes out of them; `lines` are the frequencies of disturbances that the records show without a
-/// model, shares of the sample rate.
+/// The model that records support, and what it takes out of them; of the records of estimation the signals of their loops are `known`.
 pub(crate) fn solve(
     all: &Problem<'_>,
     fresh: &[Experiment<'_>],
-    lines: &[f64],
+    known: &[LoopSignals<'_>],
     table: &mut Vec<Candidate>,
 ) -> Option<Cleaned> {
-    let first = shown::without(all, fresh, lines, table);
+    let lines = shown::shown(all.experiments, known);
+    let first = shown::without(all, fresh, &lines, table);
     let first = first.map_or_else(|| loads::solve(all, fresh, table), Some)?;
-    let more = [lines, &shown::of_loop(all, &first)].concat();
+    let more = [lines.as_slice(), &shown::of_loop(all, &first)].concat();
     let less = (more.len() > lines.len()).then(|| shown::without(all, fresh, &more, table)).flatten();
     let mut now = loads::with_steps(all, fresh, less.unwrap_or(first), table);
     for _ in 0..ROUNDS {
@@ -158,12 +157,12 @@ fn less_lines(
         let records = next.records(0, all.experiments);
         let problem = next.problem(all, &records);
         let spectra = Arc::new(problem.spectra(delays));
-        let start = |model| with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
+        let noise = &choice.found.noise;
         // A search would move the modes in question to whatever else is there.
         let still = problem.options(0, f64::INFINITY, delays);
-        let whole = search(&spectra, start(narrow.model.clone()), None, &still)?.criterion(spectra.samples());
-        let (less, origin) = (start(narrow.model.without(&narrow.places)), "without a line".into());
-        let task = Task { spectra: spectra.clone(), start: less, delays: delays.clone(), origin };
+        let start = with_best_inputs(&spectra, narrow.model.clone(), noise, problem.feedthrough);
+        let whole = search(&spectra, start, None, &still)?.criterion(spectra.samples());
+        let task = problem.beside(noise, narrow.model.without(&narrow.places), &spectra, "without a line");
         let less = problem.run(vec![task], f64::INFINITY, table);
         if less.first()?.criterion < whole {
             let lines = with_sidebands(&next.lines, &problem, less.first()?);
@@ -171,9 +170,7 @@ fn less_lines(
                 let problem = Problem { masked: lines.iter().map(|line| line.mask).collect(), ..problem };
                 let spectra = Arc::new(problem.spectra(delays));
                 let model = less.first()?.found.point.model.clone();
-                let start = with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
-                let task =
-                    Task { spectra, start, delays: delays.clone(), origin: "with the sidebands of a line".into() };
+                let task = problem.beside(noise, model, &spectra, "with the sidebands of a line");
                 let weighed = problem.run(vec![task], f64::INFINITY, table);
                 let solution = problem.solve_from(weighed, table)?;
                 (next.solution, next.lines) = (solution, lines);

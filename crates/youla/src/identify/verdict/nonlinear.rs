@@ -157,7 +157,8 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
         let mut alone = Solution { chosen: chosen.clone(), rivals: Vec::new(), unseen: None, samples: *samples };
         for (k, lines) in spectra.records.iter().enumerate() {
             alone.chosen.found.point.ends = vec![solution.chosen.found.point.ends[k].clone()];
-            let of_record = of_all(&Spectra { records: vec![lines.clone()], ..*spectra }, &alone).0;
+            let of_record =
+                of_all(&Spectra { records: vec![lines.clone()], delays: spectra.delays.clone(), ..*spectra }, &alone).0;
             for (worst, here) in evidence[..OF_RECORDS].iter_mut().zip(of_record) {
                 if here.figure > worst.figure && !here.holds() {
                     let place = format!("in record {} of {}", k + 1, spectra.records.len());

@@ -10,7 +10,7 @@ use super::problem::{Choice, LONG, Problem, Solution, Task};
 use super::unmoved::free_modes;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, long_enough};
 use crate::identify::likelihood::search::separable::separable;
-use crate::identify::likelihood::search::{with_best_ends, with_best_inputs};
+use crate::identify::likelihood::search::with_best_ends;
 use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
 use crate::identify::verdict::limits::{LARGEST_LOAD, MOST_STEPS};
@@ -169,8 +169,7 @@ fn without_free_modes(all: &Problem<'_>, now: &Cleaned, table: &mut Vec<Candidat
     if all.order.is_some() || free.is_empty() || free.len() == point.model.blocks.len() {
         return None;
     }
-    let start = with_best_inputs(&spectra, point.model.without(&free), noise, problem.feedthrough);
-    let task = Task { spectra, start, delays: choice.delays.clone(), origin: "without free modes".into() };
+    let task = problem.beside(noise, point.model.without(&free), &spectra, "without free modes");
     let chosen = problem.run(vec![task], f64::INFINITY, table).pop()?;
     Some(Cleaned { solution: Solution { chosen, ..now.solution.clone() }, ..now.clone() })
 }
@@ -190,8 +189,8 @@ fn refined(
         let records = now.records(0, all.experiments);
         let problem = now.problem(all, &records);
         let choice = now.solution.chosen.clone();
-        let (spectra, delays) = (Arc::new(problem.spectra(&choice.delays)), choice.delays);
-        let task = Task { spectra, start: choice.found.point, delays, origin: "with steps of load".into() };
+        let spectra = Arc::new(problem.spectra(&choice.delays));
+        let task = Task { spectra, start: choice.found.point, origin: "with steps of load".into() };
         let chosen = problem.run(vec![task], f64::INFINITY, &mut Vec::new()).pop()?;
         now.solution.chosen = chosen;
     }

@@ -43,13 +43,7 @@ fn halved(model: &Model, k: usize) -> Option<Model> {
     Some(wider)
 }
 
-/// The lines for other delays.
-struct Around {
-    spectra: Arc<Spectra>,
-    delays: Vec<usize>,
-}
-
-/// A step: the place of its delays, and that of the set of blocks that is left out.
+/// A step: the place of the lines for its delays, and that of the set of blocks that is left out.
 #[derive(Clone, Copy)]
 struct Step {
     around: usize,
@@ -69,13 +63,12 @@ impl Problem<'_> {
         let (model, noise) = (&best.found.point.model, &best.found.noise);
         let parts = model.separated().unwrap_or_else(|| model.clone());
         let around: Vec<Vec<usize>> = self.shifted(&best.delays).into_iter().chain([best.delays.clone()]).collect();
-        let prepared = |delays: Vec<usize>| Around { spectra: Arc::new(self.spectra(&delays)), delays };
-        let around: Vec<Around> = around.into_par_iter().map(prepared).collect();
+        let around: Vec<Arc<Spectra>> = around.into_par_iter().map(|delays| Arc::new(self.spectra(&delays))).collect();
         let sets = sets(&parts);
         let start_of = |step: Step| step.without.map_or_else(|| model.clone(), |set| parts.without(&sets[set]));
         let per_order = (self.samples().0 as f64).ln() * (self.inputs() + self.outputs()) as f64;
         let judged = |step: Step| {
-            let spectra = &around[step.around].spectra;
+            let spectra = &around[step.around];
             let every = spectra.every(COMPARED);
             let thin = spectra.thinned(every);
             let start = start_of(step);
@@ -88,14 +81,12 @@ impl Problem<'_> {
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut tasks = Vec::new();
         for step in self.promising(best, &around, &starts, &sets) {
-            let Around { spectra, delays } = &around[step.around];
-            let start = with_best_inputs(spectra, start_of(step), noise, self.feedthrough);
             let origin = if step.without.is_some() { "one mode less" } else { "another dead time" };
-            tasks.push(Task { spectra: spectra.clone(), start, delays: delays.clone(), origin: origin.into() });
+            tasks.push(self.beside(noise, start_of(step), &around[step.around], origin));
         }
         if let Some(here) = around.last() {
-            tasks.extend(self.one_more(best, &here.spectra));
-            tasks.extend(self.split(best, &parts, &here.spectra));
+            tasks.extend(self.one_more(best, here));
+            tasks.extend(self.split(best, &parts, here));
         }
         let sooner = around.iter().find(|a| a.delays.len() == 1 && a.delays[0] + 1 == best.delays[0]);
         tasks.extend(sooner.and_then(|sooner| self.pole_for_delay(best, sooner)));
@@ -103,23 +94,21 @@ impl Problem<'_> {
     }
 
     /// One sample of the dead time of a single input as a fast pole: an actuator's lag is often taken for it.
-    fn pole_for_delay(&self, best: &Choice, sooner: &Around) -> Option<Task> {
+    fn pole_for_delay(&self, best: &Choice, sooner: &Arc<Spectra>) -> Option<Task> {
         let model = &best.found.point.model;
         if self.order.is_some() || model.order() + 1 > self.largest_order {
             return None;
         }
         let lagged = model.with_lags(0, &[FAST])?;
-        let start = with_best_inputs(&sooner.spectra, lagged, &best.found.noise, self.feedthrough);
-        let origin = "a pole for a sample of dead time".into();
-        Some(Task { spectra: sooner.spectra.clone(), start, delays: sooner.delays.clone(), origin })
+        Some(self.beside(&best.found.noise, lagged, sooner, "a pole for a sample of dead time"))
     }
 
     /// All steps to be judged by their least squares: every dead time around, every block left out with a near one.
-    fn steps(&self, best: &Choice, around: &[Around], sets: &[Vec<usize>]) -> Vec<Step> {
+    fn steps(&self, best: &Choice, around: &[Arc<Spectra>], sets: &[Vec<usize>]) -> Vec<Step> {
         // A fast mode in excess hides several samples of dead time of a single input.
         let reach = if self.inputs() == 1 { REACH } else { 1 };
         let mut steps = Vec::new();
-        for (k, Around { delays, .. }) in around.iter().enumerate() {
+        for (k, delays) in around.iter().map(|spectra| &spectra.delays).enumerate() {
             if *delays != best.delays {
                 steps.push(Step { around: k, without: None });
             }
@@ -134,7 +123,13 @@ impl Problem<'_> {
     }
 
     /// The first of each kind, and for a single input the dead times next to the best.
-    fn promising(&self, best: &Choice, around: &[Around], starts: &[(f64, Step)], sets: &[Vec<usize>]) -> Vec<Step> {
+    fn promising(
+        &self,
+        best: &Choice,
+        around: &[Arc<Spectra>],
+        starts: &[(f64, Step)],
+        sets: &[Vec<usize>],
+    ) -> Vec<Step> {
         let next = |s: &Step| self.inputs() == 1 && around[s.around].delays[0].abs_diff(best.delays[0]) == 1;
         let whole = starts.iter().filter(|s| s.1.without.is_none()).enumerate();
         let whole = whole.filter(|(place, s)| *place < 2 || next(&s.1)).map(|(_, s)| s);
@@ -163,8 +158,7 @@ impl Problem<'_> {
         }
         let (_, block) = grow::modes(spectra, &best.found.point, noise, 1).into_iter().next()?;
         let wider: Model = grow::with_block(model, block);
-        let start = with_best_inputs(spectra, wider, noise, self.feedthrough);
-        Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "one mode more".into() })
+        Some(self.beside(noise, wider, spectra, "one mode more"))
     }
 
     /// Two modes in place of a lightly damped one: what two resonances within each other's width leave looks like one mode of more damping,
@@ -180,8 +174,7 @@ impl Problem<'_> {
             (deviance(&thin, &point, NOISE_ORDER).0, model)
         });
         let (_, model) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let start = with_best_inputs(spectra, model, noise, self.feedthrough);
-        Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "two modes for one".into() })
+        Some(self.beside(noise, model, spectra, "two modes for one"))
     }
 
     /// Other delays, input by input: many of a single input, up to two samples away for several and on long records.

@@ -7,8 +7,9 @@ use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
 use crate::identify::likelihood::deviation::physical;
 use crate::identify::likelihood::search::feedthrough::Answer;
 use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
-use crate::identify::likelihood::search::{Found, SearchOptions, on_groups, search};
+use crate::identify::likelihood::search::{Found, SearchOptions, on_groups, search, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
 use faer::{Mat, c64};
@@ -115,8 +116,6 @@ pub(crate) struct Task {
     pub(crate) spectra: Arc<Spectra>,
     /// Where it starts.
     pub(crate) start: Point,
-    /// Delays of the inputs in samples.
-    pub(crate) delays: Vec<usize>,
     /// Where the start came from.
     pub(crate) origin: String,
 }
@@ -251,10 +250,16 @@ impl Problem<'_> {
         Some([plant.poles().ok()?, of_loop])
     }
 
-    /// What a search found on so many samples.
-    pub(crate) fn choice(&self, found: Found, samples: usize, delays: Vec<usize>, origin: String) -> Choice {
-        let criterion = found.criterion(samples);
-        self.with_penalty(Choice { found, delays, criterion, origin })
+    /// What a search found on some lines.
+    pub(crate) fn choice(&self, found: Found, spectra: &Spectra, origin: String) -> Choice {
+        let criterion = found.criterion(spectra.samples());
+        self.with_penalty(Choice { found, delays: spectra.delays.clone(), criterion, origin })
+    }
+
+    /// The search on some lines that begins at a model beside the noise of another one, with the inputs, direct path and ends that suit it best.
+    pub(super) fn beside(&self, noise: &Noise, model: Model, spectra: &Arc<Spectra>, origin: &str) -> Task {
+        let start = with_best_inputs(spectra, model, noise, self.feedthrough);
+        Task { spectra: spectra.clone(), start, origin: origin.into() }
     }
 
     /// Searches all tasks side by side and notes them in their order.
@@ -271,19 +276,19 @@ impl Problem<'_> {
 
     /// Where a search on all lines ends.
     fn searched(&self, task: Task, aim: f64) -> Option<Choice> {
-        let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
+        let options = SearchOptions { aim, ..self.options(25, 0.3, &task.spectra.delays) };
         let found = search(&task.spectra, task.start, None, &options)?;
-        Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
+        Some(self.choice(found, &task.spectra, task.origin))
     }
 
     /// Of tasks on long records those that reach the least criteria on groups of lines, searched on all lines where they come near the aim.
     fn searched_on_groups(&self, tasks: impl ParallelIterator<Item = Task>, aim: f64) -> Vec<Choice> {
         let reached = |task: Task| {
-            let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
+            let options = SearchOptions { aim, ..self.options(25, 0.3, &task.spectra.delays) };
             let Some(found) = on_groups(&task.spectra, &task.start, None, &options) else {
                 return Some((self.searched(task, aim)?, None));
             };
-            let choice = self.choice(found, task.spectra.samples(), task.delays, task.origin);
+            let choice = self.choice(found, &task.spectra, task.origin);
             Some((choice, Some(task.spectra)))
         };
         let mut found: Vec<(Choice, Option<Arc<Spectra>>)> = tasks.filter_map(reached).collect();
@@ -291,8 +296,8 @@ impl Problem<'_> {
         found.truncate(KEPT);
         // All lines decide of the best alone.
         if let Some((best, Some(spectra))) = found.first_mut().filter(|(choice, _)| choice.criterion < aim + NEAR) {
-            let Choice { found, delays, origin, .. } = best.clone();
-            let task = Task { spectra: spectra.clone(), start: found.point, delays, origin };
+            let Choice { found, origin, .. } = best.clone();
+            let task = Task { spectra: spectra.clone(), start: found.point, origin };
             if let Some(last) = self.searched(task, aim) {
                 *best = last;
             }

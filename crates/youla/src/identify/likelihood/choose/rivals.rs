@@ -6,7 +6,6 @@ use super::neighbours::FAST;
 use super::problem::{Choice, Problem, Task};
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::with_best_inputs;
 use std::sync::Arc;
 
 /// Ratio of the decays of the first and the last of the poles that are tried in place of one.
@@ -67,10 +66,7 @@ impl Problem<'_> {
             return Vec::new();
         }
         let spectra = Arc::new(self.spectra(delays));
-        let task = |(model, origin): (Model, &str)| {
-            let start = with_best_inputs(&spectra, model, &best.found.noise, self.feedthrough);
-            Task { spectra: spectra.clone(), start, delays: delays.to_vec(), origin: origin.into() }
-        };
+        let task = |(model, origin): (Model, &str)| self.beside(&best.found.noise, model, &spectra, origin);
         models.into_iter().map(task).collect()
     }
 

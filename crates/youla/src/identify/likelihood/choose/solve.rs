@@ -7,7 +7,7 @@ use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use super::wide;
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
-use crate::identify::likelihood::search::{SearchOptions, search, with_best_ends, with_best_inputs};
+use crate::identify::likelihood::search::{SearchOptions, search, with_best_ends};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
 
@@ -112,7 +112,7 @@ impl Problem<'_> {
         let last = self.with_feedthrough(chosen.found.feedthrough);
         let options = SearchOptions { filter_moves: true, ..last.options(40, CONVERGED, &chosen.delays) };
         if let Some(found) = search(&spectra, chosen.found.point.clone(), Some(&chosen.found.noise), &options) {
-            let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
+            let last = self.choice(found, &spectra, chosen.origin.clone());
             if last.stabilised() || !chosen.stabilised() {
                 chosen = last;
                 // Beside the others it counts by what it had with a filter as theirs.
@@ -162,9 +162,8 @@ impl Problem<'_> {
     fn integrating(&self, tried: &mut Vec<Choice>, at: &Choice, table: &mut Vec<Candidate>) {
         let Some(model) = at.found.point.model.with_integrator() else { return };
         let spectra = Arc::new(self.spectra(&at.delays));
-        let start = with_best_inputs(&spectra, model, &at.found.noise, self.feedthrough);
-        let origin = "an integrator for a pole outside".into();
-        tried.extend(self.run(vec![Task { spectra, start, delays: at.delays.clone(), origin }], f64::INFINITY, table));
+        let task = self.beside(&at.found.noise, model, &spectra, "an integrator for a pole outside");
+        tried.extend(self.run(vec![task], f64::INFINITY, table));
     }
 
     /// The best models with fewer states, along their dead times: a pole in excess makes several dead times look alike, and without it
@@ -192,9 +191,8 @@ impl Problem<'_> {
                 let mut search = || {
                     let spectra = Arc::new(self.spectra(&[next]));
                     let model = from.found.point.model.clone();
-                    let start = with_best_inputs(&spectra, model, &from.found.noise, self.feedthrough);
-                    let origin = "another dead time".into();
-                    self.run(vec![Task { spectra, start, delays: vec![next], origin }], limit, table).pop()
+                    let task = self.beside(&from.found.noise, model, &spectra, "another dead time");
+                    self.run(vec![task], limit, table).pop()
                 };
                 let found = match known {
                     Some(known) => known,
@@ -217,7 +215,6 @@ impl Problem<'_> {
         Task {
             spectra: Arc::new(self.spectra(&choice.delays)),
             start: choice.found.point.clone(),
-            delays: choice.delays.clone(),
             origin: "feedthrough".into(),
         }
     }
@@ -274,7 +271,7 @@ impl Problem<'_> {
         let options = whole.options(15, 0.3, &chosen.delays);
         let start = with_best_ends(&spectra, chosen.found.point.model, &chosen.found.noise);
         let found = search(&spectra, start, Some(&chosen.found.noise), &options)?;
-        Some(self.choice(found, spectra.samples(), chosen.delays, "first part of the records".into()))
+        Some(self.choice(found, &spectra, "first part of the records".into()))
     }
 }
 

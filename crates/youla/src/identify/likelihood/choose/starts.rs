@@ -98,7 +98,7 @@ impl Problem<'_> {
                 orders.push(order);
                 let start = with_best_ends(&spectra, model, &white);
                 let origin = sources.states[source].0.clone();
-                tasks.push(Task { spectra: spectra.clone(), start, delays: delays.to_vec(), origin });
+                tasks.push(Task { spectra: spectra.clone(), start, origin });
             }
         }
         tasks

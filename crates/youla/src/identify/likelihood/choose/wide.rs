@@ -92,8 +92,7 @@ impl Problem<'_> {
         if least > DOUBTFUL || places.len() == ratios.len() {
             return None;
         }
-        let start = with_best_inputs(spectra, point.model.without(&places), noise, self.feedthrough);
-        Some(Task { spectra: spectra.clone(), start, delays: at.delays.clone(), origin: "modes less".into() })
+        Some(self.beside(noise, point.model.without(&places), spectra, "modes less"))
     }
 
     /// With the modes that explain most of what the model leaves, each more than it costs.
@@ -106,8 +105,7 @@ impl Problem<'_> {
             return None;
         }
         let wider: Model = needed.into_iter().fold(model.clone(), |model, (_, block)| grow::with_block(&model, block));
-        let start = with_best_inputs(spectra, wider, noise, self.feedthrough);
-        Some(Task { spectra: spectra.clone(), start, delays: at.delays.clone(), origin: "modes more".into() })
+        Some(self.beside(noise, wider, spectra, "modes more"))
     }
 
     /// One input a sample sooner or later, where B refitted says that this is better.
@@ -126,13 +124,12 @@ impl Problem<'_> {
             .collect();
         let all = others.into_par_iter().map(|delays| {
             let spectra = self.spectra(&delays);
-            (judged(&spectra), delays, spectra)
+            (judged(&spectra), spectra)
         });
-        let (value, delays, spectra) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (value, spectra) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
         if value > now - INDISTINCT {
             return None;
         }
-        let start = with_best_inputs(&spectra, at.found.point.model.clone(), noise, self.feedthrough);
-        Some(Task { spectra: Arc::new(spectra), start, delays, origin: "another dead time".into() })
+        Some(self.beside(noise, at.found.point.model.clone(), &Arc::new(spectra), "another dead time"))
     }
 }

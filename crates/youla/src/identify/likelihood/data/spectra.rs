@@ -101,6 +101,8 @@ pub(crate) struct Spectra {
     pub(crate) outputs: usize,
     /// Whether a loop may hold the outputs, so that the inputs depend on their noise.
     pub(crate) held: bool,
+    /// Samples by which each input is delayed.
+    pub(crate) delays: Vec<usize>,
     /// Each record.
     pub(crate) records: Vec<Lines>,
 }
@@ -147,7 +149,7 @@ impl Spectra {
             }
             lines
         });
-        Spectra { inputs: m, outputs: p, held: true, records: records.collect() }
+        Spectra { inputs: m, outputs: p, held: true, delays: delays.to_vec(), records: records.collect() }
     }
 
     /// Without the lines in some bands, and with lines beside them that are divided by what the sidebands add to their noise.
@@ -183,7 +185,7 @@ impl Spectra {
             (0..lines.z.len()).step_by(every).for_each(|k| out.push(lines, k));
             out
         };
-        Spectra { records: self.records.iter().map(of).collect(), ..*self }
+        Spectra { records: self.records.iter().map(of).collect(), delays: self.delays.clone(), ..*self }
     }
 
     /// Every how many lines leave about `count`, at least every third.

@@ -57,7 +57,7 @@ pub(crate) fn grouped(spectra: &Spectra, point: &Point, damping: f64) -> Option<
         of_groups.for_each(|i| out.y[i] = out.y[i] * 2.0 - left[i]);
         out
     });
-    let out = Spectra { records: records.collect(), ..*spectra };
+    let out = Spectra { records: records.collect(), delays: spectra.delays.clone(), ..*spectra };
     (LEAST * out.lines() < all).then_some(out)
 }
 

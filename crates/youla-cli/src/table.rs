@@ -8,7 +8,7 @@ use youla_loop::redesign::structured::PidController;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Paper, StudyExperiment, StudyMethod};
 use youla_report::numbers::fit;
-use youla_run::{Identification, ModelValidation, WrittenRun, cautions, low_fit};
+use youla_run::{Identification, ModelValidation, WrittenRun, cautions, low_fit, undecided};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
@@ -99,7 +99,11 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     let label = if dead_time > 0 { "order + dead time" } else { "order" };
     rows.push(row(label, models.iter().map(order).collect()));
     rows.push(row("stable", models.iter().map(|v| yes(v.poles.iter().all(|p| p.norm() < 1.0))).collect()));
-    rows.push(row("stabilised by K", models.iter().map(|v| yes(v.certificate.stable)).collect()));
+    let stabilised = |v: &ModelValidation| match v.certificate.stable {
+        false if undecided(found, v.method) => "undecided".to_owned(),
+        stable => yes(stable),
+    };
+    rows.push(row("stabilised by K", models.iter().map(stabilised).collect()));
     rows
 }
 

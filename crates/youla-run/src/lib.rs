@@ -40,6 +40,7 @@ pub use method::Method;
 pub use page::fit::low_fit;
 pub use page::notes::cautions;
 pub use page::page;
+pub use page::verdict::undecided;
 pub use records::segments::RecordSegment;
 pub use records::{RunRecords, SourceFile, read_records, records_in_memory, response_in_memory};
 pub use result::{Filtered, Identification, Refusal};

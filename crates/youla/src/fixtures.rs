@@ -53,12 +53,15 @@ impl Drive {
         [0, 1, 2].map(|j| Mat::from_fn(samples, 1, |t, _| rows[t][j]))
     }
 
+    /// Its controller, without the excitation.
+    pub(crate) fn controller() -> StateSpace<Discrete> {
+        let matrix = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+        StateSpace::new(matrix(0.0), matrix(1.0), matrix(7.2), matrix(-8.0), Discrete::new(1e-3).unwrap()).unwrap()
+    }
+
     /// The model that two thirds of a record support, beside the last one as fresh data.
     pub(crate) fn recommended(&self, [u, y, d]: &[Mat<f64>; 3], options: &LikelihoodOptions) -> Recommendation {
-        let time = Discrete::new(1e-3).unwrap();
-        let matrix = |value: f64| Mat::from_fn(1, 1, |_, _| value);
-        let k = StateSpace::new(matrix(0.0), matrix(1.0), matrix(7.2), matrix(-8.0), time).unwrap();
-        let explained = u - d;
+        let (k, explained) = (Drive::controller(), u - d);
         let part = |from: usize, rows: usize| {
             let [u, y, d, explained] = [u, y, d, &explained].map(|x| x.subrows(from, rows));
             (Experiment::new(u, y), LoopSignals { seen: y, explained, applied: u, excitation: Some(d) })
@@ -66,7 +69,7 @@ impl Drive {
         let third = u.nrows() / 3;
         let ((estimation, first), (fresh, second)) = (part(0, 2 * third), part(2 * third, third));
         let known = LoopKnowledge::new(Some(&k), Some(&k), vec![first], vec![second]).unwrap();
-        recommend(&[estimation], &[fresh], Some(&known), time, options).unwrap()
+        recommend(&[estimation], &[fresh], Some(&known), k.time(), options).unwrap()
     }
 
     /// The largest error of a response over its stated deviation, at 2 to 100 Hz.

@@ -16,13 +16,14 @@ fn sentence(certificate: &RunCertificate) -> String {
     let level = 100.0 * band.level;
     let stabilises = match band.holds() {
         true => format!("stabilises all {} plants", band.within),
-        false => format!("does not stabilise {} of {} plants", band.unstable_within, band.within),
+        false => format!("does not stabilise {} of the {} plants", band.unstable_within, band.within),
     };
+    let contradicted = if band.holds() { "" } else { ", although the machine ran with it" };
     let (worst, own) = (numbers::radius(band.worst_within), numbers::radius(band.radius.value));
     let [_, low, high] = numbers::with_bounds(band.radius.value, band.radius.bounds);
     format!(
-        "The running controller {stabilises} drawn from the {level:.0} % region of all parameters together; the largest pole of their loops has \
-         |z| = {worst}. That region reaches further than the region at one frequency, from which the part of the margin that is left is \
+        "The running controller {stabilises} drawn from the {level:.0} % region of all parameters together{contradicted}; the largest pole of their \
+         loops has |z| = {worst}. That region reaches further than the region at one frequency, from which the part of the margin that is left is \
          computed, and than the interval of one figure: the largest pole of the loop of the model has |z| = {own}, {level:.0} % interval \
          {low} to {high}."
     )

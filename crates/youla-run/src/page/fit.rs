@@ -41,7 +41,13 @@ pub(super) fn line(found: &Identification, summary: &Summary) -> Option<Verdict>
     text += reason.as_ref().map_or("", |(_, words)| words);
     // A fit says how much of the output is not noise; a high one is no evidence of a right model.
     let worse = !fit.is_finite() || nominal.is_some_and(|nominal| 100.0 - fit > WORSE * (100.0 - nominal));
-    let status = if worse { LineStatus::Bad } else { reason.map_or(LineStatus::Info, |(status, _)| status) };
+    // Beside a model that passed its tests the fits of two models differ by travel or noise that both leave.
+    let trusted = found.recommended.as_ref().is_ok_and(|model| model.trusted());
+    let status = match worse {
+        true if trusted => LineStatus::Caution,
+        true => LineStatus::Bad,
+        false => reason.map_or(LineStatus::Info, |(status, _)| status),
+    };
     Some(Verdict { status, text, evidence: ReportPart::Fits })
 }
 

@@ -110,7 +110,7 @@ fn residual_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         (LineStatus::Caution, text)
     } else if dependent().next().is_none() {
         let text = format!(
-            "The residual of {name} on fresh data does not depend on past excitation: no missing dynamics detected."
+            "The residual of {name} on fresh data does not depend on past excitation: it shows no missing dynamics above its noise."
         );
         (LineStatus::Good, text)
     } else if dependent().all(explained) {
@@ -230,6 +230,12 @@ fn of_alpha(found: &Identification) -> (String, LineStatus) {
 /// Distance of a pole from the unit circle that rounding may make: half of the digits of double precision, of a double pole.
 const ROUNDING: f64 = 1e-8;
 
+/// Whether the records do not distinguish the largest pole of the loop of the recommended model from one inside of the unit circle: its test passes.
+pub fn undecided(found: &Identification, method: Method) -> bool {
+    let passed = |e: &Evidence| e.question.ends_with("(stability)") && e.outcome == TestOutcome::Passed;
+    method == Method::Likelihood && found.recommended.as_ref().is_ok_and(|model| model.evidence.iter().any(passed))
+}
+
 /// Whether the controller stabilises the model.
 fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     let (method, model) = subject(found, summary)?;
@@ -244,6 +250,13 @@ fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         LineStatus::Caution => ", which rounding does not tell from 1: the loop may have a mode that does not decay",
         _ => "",
     };
+    if status == LineStatus::Bad && undecided(found, method) {
+        let text = format!(
+            "The records do not distinguish the largest pole of the loop of {name}, |z| = {worst}, from one inside of the unit circle, where it \
+             was while the machine ran with this controller."
+        );
+        return Some(Verdict { status: LineStatus::Caution, text, evidence: ReportPart::Certificate });
+    }
     let text = match found.declared.controller().is_zero() {
         true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst}{near}."),
         false => {

@@ -120,8 +120,8 @@ fn with_shown(
     refined(all, fresh, Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() }, table)
 }
 
-/// Whether steps of load are looked for: not of many channels, and not in an open loop, in which no feedback hides what a load does to the model.
-fn are_sought(all: &Problem<'_>) -> bool {
+/// Whether disturbances are looked for before the walk: not of many channels, and not in an open loop, in which no feedback hides what they do to the model.
+pub(super) fn are_sought(all: &Problem<'_>) -> bool {
     !(all.is_wide() || separable(all.outputs()) || all.open_loop)
 }
 

@@ -116,17 +116,31 @@ pub(crate) fn solve(
     known: &[LoopSignals<'_>],
     table: &mut Vec<Candidate>,
 ) -> Option<Cleaned> {
-    let lines = shown::shown(all.experiments, known);
-    let first = shown::without(all, fresh, &lines, table);
-    let first = first.map_or_else(|| loads::solve(all, fresh, table), Some)?;
-    let more = [lines.as_slice(), &shown::of_loop(all, &first)].concat();
-    let less = (more.len() > lines.len()).then(|| shown::without(all, fresh, &more, table)).flatten();
-    let mut now = loads::with_steps(all, fresh, less.unwrap_or(first), table);
+    let found = without_lines(all, fresh, known, table).or_else(|| loads::solve(all, fresh, table))?;
+    let mut now = loads::with_steps(all, fresh, found, table);
     for _ in 0..ROUNDS {
         let Some(next) = less_lines(all, fresh, &now, table) else { break };
         now = next;
     }
     Some(loads::in_fresh(all, fresh, now))
+}
+
+/// The model without the disturbances that records and loop show; `None` where there are none. Without feedback they have no share in the inputs, and
+/// of many channels a walk takes too long for lines that are modes of a short record of a structure.
+fn without_lines(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    known: &[LoopSignals<'_>],
+    table: &mut Vec<Candidate>,
+) -> Option<Cleaned> {
+    if !loads::are_sought(all) {
+        return None;
+    }
+    let lines = shown::shown(all.experiments, known);
+    let first = shown::without(all, fresh, &lines, table).or_else(|| loads::solve(all, fresh, table))?;
+    let more = [lines.as_slice(), &shown::of_loop(all, &first)].concat();
+    let less = (more.len() > lines.len()).then(|| shown::without(all, fresh, &more, table)).flatten();
+    Some(less.unwrap_or(first))
 }
 
 /// `None` where no mode is narrower than a line, and where the outputs speak for it without its line.

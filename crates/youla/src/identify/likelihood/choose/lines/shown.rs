@@ -175,7 +175,7 @@ fn unexplained(line: &Line, sines: &Mat<f64>, choice: &Choice, sizes: &Sizes) ->
 mod tests {
     use super::*;
     use crate::fixtures::Drive;
-    use crate::identify::likelihood::LikelihoodOptions;
+    use crate::identify::likelihood::{LikelihoodOptions, LoopKnowledge, problem};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -212,6 +212,28 @@ mod tests {
             let error = DRIVE.largest_error(&found);
             assert!(error < 2.5, "seed {seed}: {error}");
         }
+    }
+
+    /// The walk that begins with the run-out in the records puts poles of the loop there, and no other one is narrower than a line.
+    #[test]
+    fn run_out_shows_as_poles_of_the_loop() {
+        let k = Drive::controller();
+        let mut shown = 0;
+        for seed in 0..3 {
+            let [u, y, d] = run_out(seed);
+            let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
+            let (explained, excitation) = (&u - &d, Some(d.as_ref()));
+            let signals =
+                LoopSignals { seen: y.as_ref(), explained: explained.as_ref(), applied: u.as_ref(), excitation };
+            let known = LoopKnowledge::new(Some(&k), Some(&k), vec![signals], Vec::new()).unwrap();
+            let all = problem(&experiment, Some(&known), &LikelihoodOptions::default()).unwrap();
+            let walked = loads::solve(&all, &[], &mut Vec::new()).unwrap();
+            let found = of_loop(&all, &walked);
+            let of_run_out = |turns: &f64| [0.009, 0.018, 0.027, 0.045].iter().any(|line| (turns - line).abs() < 1e-5);
+            assert!(found.iter().all(of_run_out), "seed {seed}: {found:?}");
+            shown += found.len();
+        }
+        assert!(shown > 3, "{shown}");
     }
 
     /// No disturbance is named where what excites the records is not known, nor where the excitation has the lines.

@@ -192,15 +192,17 @@ impl Bins {
         Some(Entry { inputs: of(&sizes[..m]), sensors: of(&sizes[m..m + p]), colour, free: Vec::new() })
     }
 
-    /// The cost of logarithms of variances and of the corner of the colour, its slope and Fisher's information; `None` where a spectrum is
-    /// singular.
+    /// The cost of logarithms of variances and of the corner of the colour, its slope and the lower triangle of Fisher's information; `None` where a
+    /// spectrum is singular.
     fn scored(&self, powers: &[Vec<c64>], sizes: &[f64]) -> Option<(f64, Mat<f64>, Mat<f64>)> {
         let (m, p, count) = (self.inputs, self.outputs, sizes.len());
         let colour = sizes.get(m + p).map(|v| 1.0 - v.exp());
         let (mut cost, mut slope, mut information) = (0.0, Mat::zeros(count, 1), Mat::zeros(count, count));
         let variances: Vec<f64> = sizes.iter().map(|v| v.exp()).collect();
         let (mut inverse, mut rest) = (vec![c64::ZERO; p * p], vec![c64::ZERO; p * p]);
-        let mut parts = vec![c64::ZERO; count * p * p];
+        // Phi^-1 dPhi of the inputs and of the colour; that of a sensor is a column of Phi^-1.
+        let places: Vec<usize> = (0..m).chain(m + p..count).collect();
+        let mut parts = vec![c64::ZERO; places.len() * p * p];
         for (Bin { count: lines, back, gains, .. }, power) in self.bins.iter().zip(powers) {
             let shape = shape(colour, *back);
             let spectrum = |i: usize, l: usize| {
@@ -211,22 +213,15 @@ impl Bins {
             product(p, &inverse, power, &mut rest);
             let trace = |v: &[c64]| (0..p).map(|i| v[i * p + i].re).sum::<f64>();
             cost += lines * (determinant.ln() + trace(&rest));
-            // Phi^-1 dPhi
-            let (of_variances, of_colour) = parts.split_at_mut((m + p) * p * p);
-            for (a, part) in of_variances.chunks_mut(p * p).enumerate() {
-                if a < m {
-                    product(p, &inverse, &gains[a * p * p..(a + 1) * p * p], part);
-                    part.iter_mut().for_each(|v| *v *= variances[a] * shape);
-                } else {
-                    let i = a - m;
-                    part.fill(c64::ZERO);
-                    (0..p).for_each(|l| part[l * p + i] = inverse[l * p + i] * variances[a]);
-                }
+            let (of_inputs, of_colour) = parts.split_at_mut(m * p * p);
+            for (j, part) in of_inputs.chunks_mut(p * p).enumerate() {
+                product(p, &inverse, &gains[j * p * p..(j + 1) * p * p], part);
+                part.iter_mut().for_each(|v| *v *= variances[j] * shape);
             }
             if let Some(pole) = colour {
                 // Slope of the logarithm of the shape in that of 1 - c.
                 let along = -2.0 * (1.0 - pole) * (*back / (c64::ONE - back * pole)).re;
-                let torque = |x: usize| (0..m).fold(c64::ZERO, |sum, j| sum + of_variances[j * p * p + x]);
+                let torque = |x: usize| (0..m).fold(c64::ZERO, |sum, j| sum + of_inputs[j * p * p + x]);
                 of_colour.iter_mut().enumerate().for_each(|(x, v)| *v = torque(x) * along);
             }
             let both = |a: &[c64], b: &[c64]| {
@@ -234,10 +229,22 @@ impl Bins {
                 (0..p * p).for_each(|x| sum += (a[x] * b[x % p * p + x / p]).re);
                 sum
             };
-            for (a, part) in parts.chunks(p * p).enumerate() {
-                slope[(a, 0)] += lines * (trace(part) - both(part, &rest));
-                for (b, other) in parts.chunks(p * p).enumerate() {
-                    information[(a, b)] += lines * both(part, other);
+            // tr (v Phi^-1 dPhi) of the sensor i.
+            let at_sensor = |v: &[c64], i: usize| {
+                variances[m + i] * (0..p).map(|l| (v[i * p + l] * inverse[l * p + i]).re).sum::<f64>()
+            };
+            for (a, part) in places.iter().zip(parts.chunks(p * p)) {
+                slope[(*a, 0)] += lines * (trace(part) - both(part, &rest));
+                for (b, other) in places.iter().zip(parts.chunks(p * p)).filter(|(b, _)| *b <= a) {
+                    information[(*a, *b)] += lines * both(part, other);
+                }
+                (0..p).for_each(|i| information[((*a).max(m + i), (*a).min(m + i))] += lines * at_sensor(part, i));
+            }
+            for i in 0..p {
+                slope[(m + i, 0)] += lines * (variances[m + i] * inverse[i * p + i].re - at_sensor(&rest, i));
+                for l in 0..=i {
+                    let power = variances[m + i] * variances[m + l] * inverse[i * p + l].norm_sqr();
+                    information[(m + i, m + l)] += lines * power;
                 }
             }
         }
@@ -306,6 +313,34 @@ mod tests {
             assert!((own / unit / of_machine).ln().abs() < 0.15, "{found:?}");
         }
         assert!(((1.0 - found.colour.unwrap()) / 0.015).ln().abs() < 0.2, "{found:?}");
+    }
+
+    /// Where the powers are the spectra, the information is the slope of the slope, by central differences.
+    #[test]
+    fn the_information_is_that_of_the_cost() {
+        let bins = bins();
+        let at = [0.2_f64, -1.0, -8.0, -7.0, -3.0];
+        let variances = at.map(f64::exp);
+        let spectrum = |bin: &Bin| -> Vec<c64> {
+            let shape = shape(Some(1.0 - variances[4]), bin.back);
+            let torque = |x: usize| (bin.gains[x] * variances[0] + bin.gains[4 + x] * variances[1]) * shape;
+            (0..4).map(|x| torque(x) + if x % 3 == 0 { variances[2 + x / 3] } else { 0.0 }).collect()
+        };
+        let powers: Vec<Vec<c64>> = bins.bins.iter().map(spectrum).collect();
+        let (_, slope, information) = bins.scored(&powers, &at).unwrap();
+        assert!(slope.norm_max() < 1e-9 * information.norm_max(), "{slope:?}");
+        for b in 0..at.len() {
+            let moved = |h: f64| {
+                let mut moved = at;
+                moved[b] += h;
+                bins.scored(&powers, &moved).unwrap().1
+            };
+            let difference = (moved(1e-5) - moved(-1e-5)) * faer::Scale(1.0 / 2e-5);
+            for a in b..at.len() {
+                let error = (information[(a, b)] - difference[(a, 0)]).abs();
+                assert!(error < 1e-6 * information.norm_max(), "{a} {b}: {error}");
+            }
+        }
     }
 
     /// The slope is that of the cost by central differences.

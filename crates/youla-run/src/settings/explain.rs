@@ -89,6 +89,16 @@ impl<'a> Place<'a> {
         self.key.map_or_else(|| format!("a value {of}"), |key| format!("`{key}` {of}"))
     }
 
+    /// The kind of its value as users call it, of a list with an example.
+    fn expected(&self, must: &str) -> String {
+        let example = match self.key {
+            Some("estimation" | "verification" | "response") => " such as [{ file = \"log.csv\" }]",
+            Some("inputs" | "outputs" | "input_excitation" | "reference" | "alpha") => " such as [{ name = \"u\" }]",
+            _ => "",
+        };
+        if must == "a sequence" { format!("a list{example}") } else { expected(must) }
+    }
+
     /// What is given in one of several forms: the value of a key, a table, or the one that a word of a header names.
     fn form(&self) -> String {
         match (self.key, self.table.is_empty()) {
@@ -160,12 +170,12 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
         return format!("{} must hold exactly one of {forms}, but holds {found}{mend}", place.form());
     }
     if let Some(must) = message.strip_prefix("wanted ").or_else(|| message.strip_prefix("expected ")) {
-        return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must));
+        return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), place.expected(must));
     }
     let typed = ["invalid type: ", "invalid value: ", "invalid length "].iter().find_map(|p| message.strip_prefix(p));
     match typed.and_then(|rest| rest.rsplit_once(", expected ")) {
         Some((_, must)) => {
-            format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must))
+            format!("{} is {}, but must be {}", place.subject(), shortened(place.found), place.expected(must))
         }
         None => format!("{}: {message}", place.subject()),
     }
@@ -207,7 +217,6 @@ fn expected(must: &str) -> String {
         "usize" | "u64" | "u32" => "a whole number, zero or positive".into(),
         "f64" => "a number".into(),
         "a string" | "a borrowed string" | "path string" => "a text in quotes".into(),
-        "a sequence" => "a list".into(),
         "struct ChannelSpec" => "a table such as { name = \"u\" }".into(),
         "struct DataFile" => "a table such as { file = \"log.csv\" }".into(),
         "string or table" => "a text in quotes or a table".into(),

@@ -95,7 +95,11 @@ fn wrong_types() {
         ("take = 1200", "take = \"many\"", &["run.toml:8:42:", "`take` in [data] is \"many\"", whole]),
         ("take = 1200", "take = -5", &["run.toml:8:42:", "`take` in [data] is -5", whole]),
         ("horizon = 10", "horizon = 1.5", &["run.toml:22:11:", "`horizon` in [hansen] is 1.5", whole]),
-        ("[{ name = \"u\", unit = \"V\" }]", "\"u\"", &["run.toml:5:10:", "`inputs` in [data]", "must be a list"]),
+        (
+            "[{ name = \"u\", unit = \"V\" }]",
+            "\"u\"",
+            &["run.toml:5:10:", "`inputs` in [data]", "must be a list such as [{ name = \"u\" }]"],
+        ),
         ("numerator = [0.1]", "numerator = 0.1", &["run.toml:13:13:", "`numerator`", "a list of coefficients"]),
         ("unit = \"um\"", "from = 1.5", &["run.toml:6:33:", "`from` in [data] is 1.5", "name, or the number"]),
         ("name = \"loop\"", "name = 5", &["run.toml:1:8:", "`name` at the top level is 5", "text in quotes"]),

@@ -48,7 +48,9 @@ pub(crate) struct Rows {
     inverse: Vec<Lanes>,
     x: Vec<Lanes>,
     left: Vec<Lanes>,
-    full: Vec<Lanes>,
+    drive: Vec<Lanes>,
+    /// What a direction changes of A X + B U, of one block.
+    change: Vec<Lanes>,
     filters: Vec<Lanes>,
     /// `1 / H` of outputs that see noise at the inputs together.
     joint: Option<Filters>,
@@ -91,7 +93,8 @@ impl Rows {
             inverse: zeros(s * s),
             x: zeros(s),
             left: zeros(p * s),
-            full: zeros(s * (s + m)),
+            drive: zeros(m),
+            change: zeros(s),
             filters: zeros(p),
             joint: place.noise.joint.as_ref().map(|joint| joint.filters()),
             innovations: zeros(p),
@@ -185,34 +188,36 @@ impl Rows {
         entering: Option<&Entering>,
     ) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
-        let entries = s * (s + m);
+        let of_b = |i: usize, j: usize| s * s + i * m + j;
         let entering = entering.filter(|entering| entering.sees(at[0]));
         if let Some(entering) = entering {
             self.filtered(block, at[0], entering);
         }
         let x = if entering.is_some() { &self.filtered } else { &self.x };
-        for o in 0..block.c.len() / s {
+        self.drive.copy_from_slice(u);
+        if entering.is_some() {
+            self.drive.iter_mut().zip(&self.entered).for_each(|(drive, w)| drive.add_scaled(w, 1.0));
+        }
+        let outputs = block.c.len() / s;
+        for o in 0..outputs {
             for i in 0..s {
-                let left = &self.left[o * s + i];
                 self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
-                self.values[o * columns + at[0] + i].set_product(left, ends);
-                if directions.ncols() > 0 {
-                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &x[j]));
-                    for j in 0..m {
-                        let mut drive = u[j];
-                        if entering.is_some() {
-                            drive.add_scaled(&self.entered[j], 1.0);
-                        }
-                        self.full[s * s + i * m + j].set_product(left, &drive);
-                    }
-                }
+                self.values[o * columns + at[0] + i].set_product(&self.left[o * s + i], ends);
             }
-            for q in 0..directions.ncols() {
-                let direction = directions.col(q);
+        }
+        // dA X + dB U is the same for all outputs.
+        for q in 0..directions.ncols() {
+            let direction = directions.col(q);
+            for (i, change) in self.change[..s].iter_mut().enumerate() {
+                *change = Lanes::ZERO;
+                (0..s).for_each(|j| change.add_scaled(&x[j], direction[i * s + j]));
+                (0..m).for_each(|j| change.add_scaled(&self.drive[j], direction[of_b(i, j)]));
+            }
+            for o in 0..outputs {
                 let sum = &mut self.values[o * columns + at[1] + q];
                 *sum = Lanes::ZERO;
-                (0..entries).for_each(|e| sum.add_scaled(&self.full[e], direction[e]));
-                (0..s).for_each(|j| sum.add_scaled(&x[j], direction[entries + o * s + j]));
+                (0..s).for_each(|i| sum.add_product(&self.left[o * s + i], &self.change[i]));
+                (0..s).for_each(|j| sum.add_scaled(&x[j], direction[of_b(s, 0) + o * s + j]));
             }
         }
     }

@@ -95,13 +95,24 @@ impl Rows {
         if let Some(pole) = entering.colour() {
             self.see_colours(place.model, &z.shifted(-pole).inverse(), entering);
         }
-        for state in 0..states {
-            for l in 0..p {
+        let parameters = place.chart.parameters();
+        if p == 1 {
+            // L epsilon is the same for all parameters.
+            for state in 0..states {
+                let along = self.all_left[state].times(&self.innovations[0]);
+                let values = self.values[first..first + parameters].iter_mut().enumerate();
+                values.for_each(|(q, v)| v.add_scaled(&along, entering.slope((state, 0), q)));
+            }
+            return;
+        }
+        for q in 0..parameters {
+            for state in 0..states {
+                // dK epsilon is the same for all outputs.
+                let mut change = Lanes::ZERO;
+                let innovations = self.innovations.iter().enumerate();
+                innovations.for_each(|(l, epsilon)| change.add_scaled(epsilon, entering.slope((state, l), q)));
                 for o in 0..p {
-                    let along = self.all_left[o * states + state].times(&self.innovations[l]);
-                    for q in 0..place.chart.parameters() {
-                        self.values[o * columns + first + q].add_scaled(&along, entering.slope((state, l), q));
-                    }
+                    self.values[o * columns + first + q].add_product(&self.all_left[o * states + state], &change);
                 }
             }
         }

@@ -92,8 +92,8 @@ impl<'a> Place<'a> {
     /// The kind of its value as users call it, of a list with an example.
     fn expected(&self, must: &str) -> String {
         let example = match self.key {
-            Some("estimation" | "verification" | "response") => " such as [{ file = \"log.csv\" }]",
-            Some("inputs" | "outputs" | "input_excitation" | "reference" | "alpha") => " such as [{ name = \"u\" }]",
+            Some("estimation" | "verification" | "response") => " such as [{file = \"log.csv\"}]",
+            Some("inputs" | "outputs" | "input_excitation" | "reference" | "alpha") => " such as [{name = \"u\"}]",
             _ => "",
         };
         if must == "a sequence" { format!("a list{example}") } else { expected(must) }

@@ -98,7 +98,7 @@ fn wrong_types() {
         (
             "[{ name = \"u\", unit = \"V\" }]",
             "\"u\"",
-            &["run.toml:5:10:", "`inputs` in [data]", "must be a list such as [{ name = \"u\" }]"],
+            &["run.toml:5:10:", "`inputs` in [data]", "must be a list such as [{name = \"u\"}]"],
         ),
         ("numerator = [0.1]", "numerator = 0.1", &["run.toml:13:13:", "`numerator`", "a list of coefficients"]),
         ("unit = \"um\"", "from = 1.5", &["run.toml:6:33:", "`from` in [data] is 1.5", "name, or the number"]),

@@ -169,7 +169,9 @@ fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
 fn of_recommended(error: Error) -> Error {
     match error {
         Error::NotStabilised { pole, .. } => {
-            let cause = "the verdict says whether the log agrees with the declared controller".to_owned();
+            let cause =
+                "the verdict says whether the log agrees with the declared controller, and whether it shows this pole"
+                    .to_owned();
             Error::NotStabilised { model: "recommended", pole, cause }
         }
         other => other,

@@ -125,7 +125,7 @@ pub(crate) fn solve(
     Some(loads::in_fresh(all, fresh, now))
 }
 
-/// The model without the disturbances that records and loop show; `None` where there are none. Without feedback they have no share in the inputs, and
+/// The model without the disturbances that records and loop show; `None` where they are not looked for: without feedback they have no share in the inputs, and
 /// of many channels a walk takes too long for lines that are modes of a short record of a structure.
 fn without_lines(
     all: &Problem<'_>,

@@ -1,6 +1,7 @@
 //! What the program does beside finding: text, files, exit codes, refusals.
 
 use super::records::folder;
+use crate::common::uniform;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -16,12 +17,8 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
 
 /// White input through a first-order lag, white noise; rows `t, u, y`.
 fn log(rows: usize) -> Vec<[f64; 3]> {
-    let mut state = 1u64;
-    let mut random = move || {
-        // Knuth, MMIX.
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut uniform = uniform(1);
+    let mut random = || uniform() - 0.5;
     let mut x = 0.0;
     (0..rows)
         .map(|k| {

@@ -1,6 +1,6 @@
 //! A periodic excitation: what its lines say of the recommended model and of the plant.
 
-use crate::common::{empty_folder, youla};
+use crate::common::{empty_folder, uniform, youla};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
@@ -10,12 +10,7 @@ const PERIOD: usize = 250;
 
 /// Three records `y+ = 0.8 y + 0.2 (u + cubic u^3) + noise`, `u = d - y`, d of 40 lines with other phases in each.
 fn logs(folder: &std::path::Path, cubic: f64) {
-    let mut state = 1u64;
-    let mut random = move || {
-        // Knuth, MMIX.
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = uniform(1);
     for record in 0..RECORDS {
         let phases: Vec<f64> = (0..40).map(|_| random()).collect();
         let turns = |t: usize, l: usize| (l + 1) as f64 * t as f64 / PERIOD as f64 + phases[l];

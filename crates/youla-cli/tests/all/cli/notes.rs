@@ -1,6 +1,6 @@
 //! Notes of a run that must say what the record holds, and no more.
 
-use crate::common::{SETTINGS, csv, log, loop_folder, settings, youla};
+use crate::common::{SETTINGS, csv, log, loop_folder, settings, uniform, youla};
 
 /// Of the variance of y the noise, uniform within 0.025, is 26.2 dB below; the loop amplifies it by a few dB. A model explains 99 % of y,
 /// so that a ratio below 18 dB cannot be right. Notes that are alike are one.
@@ -36,15 +36,11 @@ fn a_residual_of_rounding_depends_on_nothing() {
 /// A log that is mostly noise has a fit below half: the terminal says that the noise is the reason. The log with little noise needs no such sentence.
 #[test]
 fn a_low_fit_has_its_reason_on_the_terminal() {
-    let (mut y, mut before, mut state) = (0.0, 0.0, 1u64);
-    let mut noise = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let (mut y, mut before, mut random) = (0.0, 0.0, uniform(1));
     let rows: Vec<[f64; 4]> = log()
         .into_iter()
         .map(|[t, _, d, _]| {
-            let measured = y + 1.5 * noise();
+            let measured = y + 1.5 * (random() - 0.5);
             let (u, now) = (d - 2.0 * measured, y);
             (y, before) = (1.5 * y - 0.56 * before + 0.06 * u, now);
             [t, u, d, measured]
@@ -87,28 +83,24 @@ fn a_time_limit_beside_a_fixed_order_is_no_promise() {
     }
 }
 
-/// A sensor that is coupled by alternating current, under an integrator: the loop has a pole next to 1, and the static gain, of -0.6 % of the rest, is not
+/// An AC-coupled sensor under an integrator: the loop has a pole next to 1, and the static gain, of -0.6 % of the rest, is not
 /// known to a percent. Where the model has that pole outside of the circle, the table and the caution say that the records do not place it.
 #[test]
 fn a_pole_that_the_records_do_not_place_is_undecided() {
-    let mut state = 7u64;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut random = uniform(7);
     let (mut x, mut sum, mut before) = (0.0, 0.0, [0.0; 2]);
     let rows: Vec<[f64; 4]> = (0..4000)
         .map(|t| {
             x = 0.8 * x + 0.2 * (before[0] - 1.006 * before[1]);
-            let y = x + 0.17 * random();
+            let y = x + 0.17 * (random() - 0.5);
             sum += 0.05 * y;
-            let d = random().signum();
+            let d = (random() - 0.5).signum();
             before = [d - sum, before[0]];
             [t as f64 * 0.001, before[0], d, y]
         })
         .collect();
-    let text = SETTINGS_OF_COUPLED;
-    let folder = loop_folder("undecided", &[("log.csv", csv(&rows).as_bytes()), ("run.toml", text.as_bytes())]);
+    let files = [("log.csv", csv(&rows)), ("run.toml", AC_COUPLED.to_owned())];
+    let folder = loop_folder("undecided", &files.each_ref().map(|(name, text)| (*name, text.as_bytes())));
     let found = youla(&folder, &["identify", "run.toml", "--out", "out"]);
     assert_eq!(found.code, Some(0), "{}", found.stderr);
     let text = (found.stdout + &found.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
@@ -116,7 +108,7 @@ fn a_pole_that_the_records_do_not_place_is_undecided() {
     assert!(text.contains("do not distinguish the largest pole of the loop of the recommended model"), "{text}");
 }
 
-const SETTINGS_OF_COUPLED: &str = "name = \"coupled\"\n[data]\nsample_time = 0.001\ninputs = [{ name = \"u\" }]\n\
+const AC_COUPLED: &str = "name = \"coupled\"\n[data]\nsample_time = 0.001\ninputs = [{ name = \"u\" }]\n\
     outputs = [{ name = \"y\" }]\ninput_excitation = [{ name = \"d\" }]\nestimation = [{ file = \"log.csv\", take = 2500 }]\n\
     verification = [{ file = \"log.csv\", skip = 2500 }]\n[controller.difference_equation]\nfeedback = \"negative\"\n\
     numerator = [0.05]\ndenominator = [1.0, -1.0]\n";

@@ -1,6 +1,6 @@
 //! `structure = "pid"` in `[redesign]`: what a run writes, and its exports.
 
-use crate::common::{empty_folder, youla};
+use crate::common::{empty_folder, uniform, youla};
 use serde_json::Value;
 use std::fmt::Write;
 use std::fs;
@@ -8,12 +8,8 @@ use std::path::{Path, PathBuf};
 
 /// Uniform on -0.5 to 0.5.
 fn noise() -> impl FnMut() -> f64 {
-    let mut state = 7u64;
-    move || {
-        // Knuth, MMIX.
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    }
+    let mut random = uniform(7);
+    move || random() - 0.5
 }
 
 /// `G = 0.02 / (z - pole)` under a PI, u = d + 2 e + 0.05 i.

@@ -1,6 +1,6 @@
 //! A measured response instead of a log: `[[data.response]]`.
 
-use crate::common::{empty_folder, youla};
+use crate::common::{empty_folder, uniform, youla};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -20,12 +20,8 @@ fn settings(data: &str) -> String {
 
 /// `G = 0.2 / (z - 0.8)` under `u = d - y` at 80 frequencies, each value with an error of 1 %.
 fn table(folder: &Path, of_loop: bool, decibel: bool) {
-    let mut state = 1u64;
-    let mut random = move || {
-        // Knuth, MMIX.
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut uniform = uniform(1);
+    let mut random = || uniform() - 0.5;
     let endings = if decibel { ["dB", "deg"] } else { ["re", "im"] };
     let pairs = if of_loop { vec!["u/d", "y/d"] } else { vec!["y/u"] };
     let names: Vec<String> = pairs.iter().flat_map(|pair| endings.map(|e| format!("{pair} {e}"))).collect();

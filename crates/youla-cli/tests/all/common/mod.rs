@@ -47,14 +47,18 @@ pub(crate) fn settings(passage: &str, replacement: &str) -> String {
     SETTINGS.replacen(passage, replacement, 1)
 }
 
-/// 2000 rows `t, u, d, y` of `y+ = 1.5 y - 0.56 y- + 0.06 u`, `u = d - 2 (y + n)`.
-pub(crate) fn log() -> Vec<[f64; 4]> {
-    let mut state = 1u64;
-    let mut random = move || {
-        // Knuth, MMIX.
+/// Numbers from 0 to 1, uniform (Knuth, MMIX).
+pub(crate) fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    }
+}
+
+/// 2000 rows `t, u, d, y` of `y+ = 1.5 y - 0.56 y- + 0.06 u`, `u = d - 2 (y + n)`.
+pub(crate) fn log() -> Vec<[f64; 4]> {
+    let mut random = uniform(1);
     let (mut y, mut before, mut d, mut hold) = (0.0, 0.0, 1.0, 0);
     (0..2000)
         .map(|k| {

@@ -99,9 +99,9 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     let label = if dead_time > 0 { "order + dead time" } else { "order" };
     rows.push(row(label, models.iter().map(order).collect()));
     rows.push(row("stable", models.iter().map(|v| yes(v.poles.iter().all(|p| p.norm() < 1.0))).collect()));
-    let stabilised = |v: &ModelValidation| match v.certificate.stable {
-        false if undecided(found, v.method) => "undecided".to_owned(),
-        stable => yes(stable),
+    let stabilised = |v: &ModelValidation| match undecided(found, v.method) {
+        true => "undecided".to_owned(),
+        false => yes(v.certificate.stable),
     };
     rows.push(row("stabilised by K", models.iter().map(stabilised).collect()));
     rows

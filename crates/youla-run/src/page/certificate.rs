@@ -14,11 +14,13 @@ pub(super) fn line(certificate: &RunCertificate) -> Verdict {
 fn sentence(certificate: &RunCertificate) -> String {
     let band = &certificate.band;
     let level = 100.0 * band.level;
-    let stabilises = match band.holds() {
-        true => format!("stabilises all {} plants", band.within),
-        false => format!("does not stabilise {} of the {} plants", band.unstable_within, band.within),
+    let (stabilises, contradicted) = match band.holds() {
+        true => (format!("stabilises all {} plants", band.within), ""),
+        false => (
+            format!("does not stabilise {} of the {} plants", band.unstable_within, band.within),
+            ", although the machine ran with it",
+        ),
     };
-    let contradicted = if band.holds() { "" } else { ", although the machine ran with it" };
     let (worst, own) = (numbers::radius(band.worst_within), numbers::radius(band.radius.value));
     let [_, low, high] = numbers::with_bounds(band.radius.value, band.radius.bounds);
     format!(

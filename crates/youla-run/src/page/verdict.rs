@@ -232,7 +232,8 @@ const ROUNDING: f64 = 1e-8;
 
 /// Whether the records do not distinguish the largest pole of the loop of the recommended model from one inside of the unit circle: its test passes.
 pub fn undecided(found: &Identification, method: Method) -> bool {
-    let passed = |e: &Evidence| e.question.ends_with("(stability)") && e.outcome == TestOutcome::Passed;
+    let outside = |e: &Evidence| e.question.ends_with("(stability)") && e.figure >= e.limit;
+    let passed = |e: &Evidence| outside(e) && e.outcome == TestOutcome::Passed;
     method == Method::Likelihood && found.recommended.as_ref().is_ok_and(|model| model.evidence.iter().any(passed))
 }
 
@@ -250,7 +251,7 @@ fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         LineStatus::Caution => ", which rounding does not tell from 1: the loop may have a mode that does not decay",
         _ => "",
     };
-    if status == LineStatus::Bad && undecided(found, method) {
+    if undecided(found, method) {
         let text = format!(
             "The records do not distinguish the largest pole of the loop of {name}, |z| = {worst}, from one inside of the unit circle, where it \
              was while the machine ran with this controller."

@@ -89,16 +89,6 @@ impl<'a> Place<'a> {
         self.key.map_or_else(|| format!("a value {of}"), |key| format!("`{key}` {of}"))
     }
 
-    /// The kind of its value as users call it, of a list with an example.
-    fn expected(&self, must: &str) -> String {
-        let example = match self.key {
-            Some("estimation" | "verification" | "response") => " such as [{file = \"log.csv\"}]",
-            Some("inputs" | "outputs" | "input_excitation" | "reference" | "alpha") => " such as [{name = \"u\"}]",
-            _ => "",
-        };
-        if must == "a sequence" { format!("a list{example}") } else { expected(must) }
-    }
-
     /// What is given in one of several forms: the value of a key, a table, or the one that a word of a header names.
     fn form(&self) -> String {
         match (self.key, self.table.is_empty()) {
@@ -170,12 +160,12 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
         return format!("{} must hold exactly one of {forms}, but holds {found}{mend}", place.form());
     }
     if let Some(must) = message.strip_prefix("wanted ").or_else(|| message.strip_prefix("expected ")) {
-        return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), place.expected(must));
+        return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must, place.key));
     }
     let typed = ["invalid type: ", "invalid value: ", "invalid length "].iter().find_map(|p| message.strip_prefix(p));
     match typed.and_then(|rest| rest.rsplit_once(", expected ")) {
         Some((_, must)) => {
-            format!("{} is {}, but must be {}", place.subject(), shortened(place.found), place.expected(must))
+            format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must, place.key))
         }
         None => format!("{}: {message}", place.subject()),
     }
@@ -211,9 +201,16 @@ pub(super) fn forms<T: DeserializeOwned>() -> String {
     refusal.split('`').skip(3).step_by(2).collect::<Vec<_>>().join(", ")
 }
 
-/// A kind of value as users call it.
-fn expected(must: &str) -> String {
+/// A kind of value as users call it, of a list under some keys with an example.
+fn expected(must: &str, key: Option<&str>) -> String {
     match must {
+        "a sequence" => match key {
+            Some("estimation" | "verification" | "response") => "a list such as [{file = \"log.csv\"}]".into(),
+            Some("inputs" | "outputs" | "input_excitation" | "reference" | "alpha") => {
+                "a list such as [{name = \"u\"}]".into()
+            }
+            _ => "a list".into(),
+        },
         "usize" | "u64" | "u32" => "a whole number, zero or positive".into(),
         "f64" => "a number".into(),
         "a string" | "a borrowed string" | "path string" => "a text in quotes".into(),

@@ -50,7 +50,7 @@ impl Step {
 pub(crate) type Steps = [Vec<Vec<Step>>; 2];
 
 /// The inputs with the load that acts beside them.
-pub(super) fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat<f64>> {
+fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat<f64>> {
     let with = |(e, steps): (&Experiment<'_>, &Vec<Step>)| {
         let mut u = e.u.to_owned();
         for step in steps {
@@ -59,6 +59,11 @@ pub(super) fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat
         u
     };
     records.iter().zip(steps).map(with).collect()
+}
+
+/// The inputs of the records of estimation and of the fresh ones with their steps of load.
+pub(super) fn inputs(all: &Problem<'_>, fresh: &[Experiment<'_>], steps: &Steps) -> [Vec<Mat<f64>>; 2] {
+    [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])]
 }
 
 /// Parameters of some steps: place and size.
@@ -102,7 +107,7 @@ pub(super) fn in_fresh(all: &Problem<'_>, fresh: &[Experiment<'_>], mut now: Cle
     let found = found.collect::<Option<Vec<Vec<Step>>>>().filter(|found| found.iter().any(|steps| !steps.is_empty()));
     if let Some(found) = found {
         let steps = [vec![Vec::new(); all.experiments.len()], found];
-        now.inputs = Some([loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])]);
+        now.inputs = Some(inputs(all, fresh, &steps));
         now.steps = Some(steps);
     }
     now
@@ -116,8 +121,8 @@ fn with_shown(
     table: &mut Vec<Candidate>,
 ) -> Option<Cleaned> {
     let steps = steps(all, fresh, now)?;
-    let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
-    refined(all, fresh, Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() }, table)
+    let inputs = Some(inputs(all, fresh, &steps));
+    refined(all, fresh, Cleaned { inputs, steps: Some(steps), ..now.clone() }, table)
 }
 
 /// Whether disturbances are looked for before the walk: not of many channels, and not in an open loop, in which no feedback hides what they do to the model.
@@ -216,8 +221,7 @@ fn resized(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &mut Cleaned) -> Op
             }
         }
     }
-    let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
-    (now.inputs, now.steps) = (Some(inputs), Some(steps));
+    (now.inputs, now.steps) = (Some(inputs(all, fresh, &steps)), Some(steps));
     Some(noticed)
 }
 

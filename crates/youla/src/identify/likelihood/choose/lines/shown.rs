@@ -7,7 +7,7 @@
 
 use super::fit::{Line, Residual, WIDEST, amplitudes, of_amplitudes, sharpened, with_sidebands};
 use super::{Cleaned, LOWEST, SHAPES, residuals, subtracted};
-use crate::identify::likelihood::choose::loads::{self, Steps, loaded};
+use crate::identify::likelihood::choose::loads;
 use crate::identify::likelihood::choose::problem::{Choice, Problem};
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, lines_of, long_enough};
 use crate::identify::likelihood::search::driven::NARROW;
@@ -99,8 +99,7 @@ pub(super) fn without(
     });
     (now.lines, now.outputs) = (lines, Some(outputs));
     // Steps of load act beside the inputs with their lines.
-    let whole = |steps: &Steps| [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(e, steps)| loaded(e, steps));
-    now.inputs = now.steps.as_ref().map(whole);
+    now.inputs = now.steps.as_ref().map(|steps| loads::inputs(all, fresh, steps));
     let left = [(0, all.experiments), (1, fresh)].map(|(k, records)| {
         let clean = now.records(k, records);
         let problem = now.problem(all, &clean);

@@ -48,6 +48,7 @@ pub(crate) struct Rows {
     inverse: Vec<Lanes>,
     x: Vec<Lanes>,
     left: Vec<Lanes>,
+    /// U + w of each input.
     drive: Vec<Lanes>,
     /// What a direction changes of A X + B U, of one block.
     change: Vec<Lanes>,
@@ -189,6 +190,7 @@ impl Rows {
     ) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
         let of_b = |i: usize, j: usize| s * s + i * m + j;
+        let of_c = |o: usize, j: usize| s * (s + m) + o * s + j;
         let entering = entering.filter(|entering| entering.sees(at[0]));
         if let Some(entering) = entering {
             self.filtered(block, at[0], entering);
@@ -217,7 +219,7 @@ impl Rows {
                 let sum = &mut self.values[o * columns + at[1] + q];
                 *sum = Lanes::ZERO;
                 (0..s).for_each(|i| sum.add_product(&self.left[o * s + i], &self.change[i]));
-                (0..s).for_each(|j| sum.add_scaled(&x[j], direction[of_b(s, 0) + o * s + j]));
+                (0..s).for_each(|j| sum.add_scaled(&x[j], direction[of_c(o, j)]));
             }
         }
     }
